@@ -3,7 +3,7 @@
     python scripts/draw_rooms.py [OUT.svg]
 
 The order of the rooms comes from the contract in pyproject.toml. The arrows come from all import statements, those inside
-functions included, but for those that only types need. An import that goes upwards is an error (exit code 1).
+functions and those for types included. An import that goes upwards is an error (exit code 1).
 """
 
 from __future__ import annotations
@@ -67,21 +67,13 @@ def room_of(module: str, rooms: list[str]) -> str:
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
-    """Yield the names of all modules that a file imports, wherever it does, but where only a type is meant."""
-    for node in ast.walk(_Ran().visit(tree)):
+    """Yield the names of all modules that a file imports, wherever it does."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             # `from contin import checks` imports a module, too
             yield from (f"contin.{alias.name}" for alias in node.names) if node.module == "contin" else (node.module,)
-
-
-class _Ran(ast.NodeTransformer):
-    """Leaves what runs."""
-
-    def visit_If(self, node: ast.If) -> ast.AST | None:
-        """Drop what is for type checkers only."""
-        return None if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else self.generic_visit(node)
 
 
 def imports(package: Path = ROOT / "contin") -> tuple[Imports, Imports]:

@@ -23,13 +23,14 @@ intervals are joined in the same way, as long as that holds. What is left is a s
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.boundary.system import Collocation
 from contin.collocation.basis import interpolation
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
@@ -37,10 +38,8 @@ from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
 from contin.linalg.orientation import canonical_basis
 
-if TYPE_CHECKING:
-    from contin.boundary.system import Collocation
-    from contin.boundary.variational import Symmetry
-
+#: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
+Symmetry = Callable[[Array, Array], Array]
 #: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from
 #: zero, so that elimination loses no digits.
 _POSITIVE = 0.1
@@ -310,7 +309,8 @@ def _jacobian(system: Collocation, x: Array) -> Array:
     """Return the derivatives of rhs and integrands by (x, lambda) at the Gauss points, in the user's units."""
     batch = system.problem.batch("field")
     points = system.states_at_gauss_points(x)
-    return batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.columns([]))[1]
+    found: Array = batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.columns([]))[1]
+    return found
 
 
 def _roots(hll: Array) -> tuple[Array, Array] | None:

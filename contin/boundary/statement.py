@@ -6,22 +6,20 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from contin import checks
 from contin.arrays import Array, Function, Places
 from contin.boundary.system import Collocation
 from contin.collocation.degree import usual_degree
 from contin.core.scales import Scales
+from contin.core.trial import Event
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
+from contin.events.index import Stability
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
-
-if TYPE_CHECKING:
-    from contin.core.trial import Event
-    from contin.events.arc import SpecialPoint
-    from contin.events.index import Stability
 
 
 @dataclass(frozen=True, eq=False, repr=False)

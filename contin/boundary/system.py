@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,18 +24,15 @@ from contin.collocation.workspace import Workspace, workspace
 from contin.core.protocol import Carrier, Discretization
 from contin.core.scales import Scales, usual
 from contin.core.system import System
+from contin.core.trial import Event
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
+from contin.events.index import Stability
 from contin.functions.batch import Batch, Columns, Selections
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
 from contin.linalg.segments import run, share
-
-if TYPE_CHECKING:
-    from contin.boundary.statement import BoundaryValueProblem
-    from contin.core.trial import Event
-    from contin.events.arc import SpecialPoint
-    from contin.events.index import Stability
 
 
 class Collocation(System):
@@ -71,14 +68,14 @@ class Collocation(System):
     (19, [0.0, 0.5, 1.0])
     """
 
-    problem: BoundaryValueProblem
+    problem: Any
     plain = True
     #: Multipliers in a kernel, of cycles.
     monodromy: Any = None
 
     def __init__(
         self,
-        problem: BoundaryValueProblem,
+        problem: Any,
         mesh: Sequence[float] | Array,
         degree: int,
         free: Sequence[str],
@@ -517,7 +514,7 @@ class Collocation(System):
         row /= size or 1.0
         return row
 
-    def with_reference(self, x: Array) -> Collocation:
+    def with_reference(self, x: Array) -> Self:
         """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
         return self
 
@@ -631,7 +628,8 @@ class Collocation(System):
 
     def events(self) -> list[Event]:
         """Return those of the statement."""
-        return self.problem.events()
+        found: list[Event] = self.problem.events()
+        return found
 
     @property
     def stored(self) -> dict[str, Array]:
@@ -644,20 +642,24 @@ class Collocation(System):
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the statement says."""
-        return self.problem.stability(point)
+        found: Stability = self.problem.stability(point)
+        return found
 
     def degenerate(self, x: Array) -> str:
         """Return what the statement says."""
-        return self.problem.degenerate(self, x)
+        found: str = self.problem.degenerate(self, x)
+        return found
 
     def undetermined(self, x: Array) -> str:
         """Return what the statement says."""
-        return self.problem.undetermined(self, x)
+        found: str = self.problem.undetermined(self, x)
+        return found
 
     @property
     def index(self) -> Event | None:
         """That of the statement."""
-        return self.problem.index
+        found: Event | None = self.problem.index
+        return found
 
 
 #: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from contin import checks
 from contin.arrays import Array, Function
 from contin.boundary.canonical import Canonical, Variation, canonical
-from contin.boundary.second_variation import INDEX, degeneracy, dependent_conditions, legendre, stability_of
+from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, dependent_conditions, legendre, stability_of
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
 from contin.core.trial import Event
@@ -20,9 +20,6 @@ from contin.events.index import Stability
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
 from contin.problems.statement import check_statement
-
-#: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
-Symmetry = Callable[[Array, Array], Array]
 
 
 class VariationalProblem(BoundaryValueProblem):

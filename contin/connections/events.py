@@ -26,17 +26,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.connections.equations import ConnectionEquations
 from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
 from contin.linalg.orientation import oriented
-
-if TYPE_CHECKING:
-    from contin.connections.system import ConnectionCollocation
 
 #: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
 #: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
@@ -56,7 +54,7 @@ _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 _REAL = 1e-8
 
 
-def homoclinic_points(system: ConnectionCollocation) -> list[Event]:
+def homoclinic_points(system: ConnectionEquations) -> list[Event]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
@@ -76,7 +74,7 @@ def homoclinic_points(system: ConnectionCollocation) -> list[Event]:
     return found
 
 
-def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> Event | None:
+def own_test_of(label: str, system: ConnectionEquations, x: Array) -> Event | None:
     """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
 
     Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
@@ -143,7 +141,7 @@ def crossing(point: Any) -> tuple[bool, int]:
     return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
 
 
-def ending(system: ConnectionCollocation, side: int) -> Event:
+def ending(system: ConnectionEquations, side: int) -> Event:
     """Return the test function NCH of an end (of orbits to a saddle-node) or side; it is positive on the curve."""
     return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
 
@@ -172,14 +170,14 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     return ("SH", "Shilnikov-Hopf") if point.label == "NCH" and kinds[nearest] else None
 
 
-def _system(trial: Trial) -> ConnectionCollocation:
+def _system(trial: Trial) -> ConnectionEquations:
     system: Any = trial.system
-    found: ConnectionCollocation = system
+    found: ConnectionEquations = system
     return found
 
 
 @functools.lru_cache(maxsize=4)
-def _reference(system: ConnectionCollocation) -> Trial:
+def _reference(system: ConnectionEquations) -> Trial:
     """Return the reference of a discretization as a point."""
     return Trial.without_tangent(system, system.reference)
 
@@ -291,7 +289,7 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
 
 
 @functools.lru_cache(maxsize=4)
-def _border(system: ConnectionCollocation) -> Array:
+def _border(system: ConnectionEquations) -> Array:
     """Return the left null vector at the reference."""
     return _left_null_vector(system, system.reference, np.random.default_rng(11).standard_normal(system.equations))
 
@@ -303,7 +301,7 @@ def _adjoint(trial: Trial) -> Array:
     return _left_null_vector(system, trial.x, _border(system))
 
 
-def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array) -> Array:
+def _left_null_vector(system: ConnectionEquations, x: Array, border: Array) -> Array:
     """Return w with w F_z = 0, of unit length, and its product with the border positive."""
     own = [name for name in system.free if name not in system.problem.multipliers]
     held = np.zeros((len(own), system.size + 1))

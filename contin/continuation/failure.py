@@ -186,7 +186,7 @@ def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: N
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
     if not settings.folds or state.accepted != _STANDING or state.sense:
         return None
-    stop = trial.system.standstill(trial, primary)
+    stop: Stop | None = trial.system.standstill(trial, primary)
     if stop is None and not trial.system.intervals:
         place = f"{primary} stays at {trial[primary]:.10g}, as far as can be told"
         notes.add(f"{place}: a vertical family, as of a linear or conservative system; folds are not told there")

@@ -14,7 +14,7 @@ from contin.core.trial import Event
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.index import Stability, nullity_of
 from contin.events.refinement import refined
-from contin.events.test_functions import with_normal_form
+from contin.events.usual import with_normal_form
 from contin.results.point import Point
 
 #: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.

@@ -37,7 +37,7 @@ from contin.events.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.extrema import extremum
 from contin.events.inspection import Start
-from contin.events.test_functions import fold, limits, user_zeros, within_limits
+from contin.events.usual import fold, limits, user_zeros, within_limits
 from contin.names import exact_text
 from contin.results.point import Point
 

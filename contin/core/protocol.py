@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,13 +18,6 @@ from contin.core.differences import derivative
 from contin.core.multilinear import of_lines
 from contin.linalg.factors import Factors
 from contin.problems.statement import Statement
-
-if TYPE_CHECKING:
-    from contin.core.state import Stop
-    from contin.core.trial import Event, Trial
-    from contin.events.arc import Arc, SpecialPoint
-    from contin.events.coefficient import Coefficient
-    from contin.functions.batch import Batch
 
 #: Takes vectors of unknowns from one discretization of a problem to another.
 Carrier = Callable[[Array], Array]
@@ -246,7 +239,7 @@ class Discretization(Equations, Protocol):
         """
         return None
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[Any]:
         """Return the test functions that the kind brings, beyond folds and branch points.
 
         Their signs may differ between meshes. They ask ``trial.system``: the mesh changes along a branch.
@@ -254,25 +247,25 @@ class Discretization(Equations, Protocol):
         return []
 
     @property
-    def index(self) -> Event | None:
+    def index(self) -> Any:
         """The test function whose value is the index of a point, of a problem with an energy."""
         return None
 
-    def stability(self, point: SpecialPoint) -> Any:
+    def stability(self, point: Any) -> Any:
         """Return the `Stability` of a point of a kind with an index; at a special one, what vanishes there does not count."""
         return None
 
     @property
-    def size_of_solutions(self) -> Event | None:
+    def size_of_solutions(self) -> Any:
         """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""
         return None
 
     @property
-    def small_equations(self) -> Batch | None:
+    def small_equations(self) -> Any:
         """The functions of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
         return None
 
-    def home(self, arc: Arc) -> SpecialPoint | None:
+    def home(self, arc: Any) -> Any:
         """Return the end of the branch inside a step, where solutions become those of another kind."""
         return None
 
@@ -280,7 +273,7 @@ class Discretization(Equations, Protocol):
         """Return whether a step from x to z has left its branch for solutions of no size."""
         return False
 
-    def cannot_branch(self, arc: Arc) -> bool:
+    def cannot_branch(self, arc: Any) -> bool:
         """Return whether both ends of a step of a branch say that no other branch crosses it there."""
         return False
 
@@ -288,31 +281,31 @@ class Discretization(Equations, Protocol):
         """Return whether other branches are looked for at a multiple point."""
         return True
 
-    def judged(self, point: SpecialPoint) -> SpecialPoint:
+    def judged(self, point: Any) -> Any:
         """Return a special point, with the label and name, or as the end of the branch, that the kind knows it by."""
         return point
 
-    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+    def coefficient(self, point: Any) -> Any:
         """Return the coefficient of the normal form at a special point."""
         return None
 
-    def events_on_folds(self) -> list[Event]:
+    def events_on_folds(self) -> list[Any]:
         """Return the test functions of a curve of folds, beyond cusps and branch points."""
         return []
 
-    def events_on_curves(self) -> list[Event]:
+    def events_on_curves(self) -> list[Any]:
         """Return the test functions of a curve along which one of `events` stays zero."""
         return []
 
-    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
+    def judged_on_curve(self, point: Any, solution: Any) -> Any:
         """Return a special point of such a curve, with ``solution`` there, by the label and name that the kind knows it by."""
         return point
 
-    def standstill(self, trial: Trial, primary: str) -> Stop | None:
+    def standstill(self, trial: Any, primary: str) -> Any:
         """Return the reason to end a run whose primary parameter has not moved; None to go on."""
         return None
 
-    def explained(self, stop: Stop, trial: Trial) -> Stop:
+    def explained(self, stop: Any, trial: Any) -> Any:
         """Return the reason why a run ends, with what the kind knows of its last point."""
         return stop
 

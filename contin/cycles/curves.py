@@ -9,13 +9,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
 from contin.core.trial import Event, Trial
+from contin.cycles.equations import PeriodicEquations
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.cycles.normal_forms import NormalForms
 from contin.cycles.round import Round
@@ -24,20 +25,17 @@ from contin.defining.fold_curve import FoldCurve, shrinking
 from contin.events.coefficient import Coefficient
 from contin.problems.own_names import PERIOD
 
-if TYPE_CHECKING:
-    from contin.cycles.system import PeriodicCollocation
-
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3
 
 
 class CycleCurve(MultiplierCurve):
-    """Cycles with a critical multiplier, on a `PeriodicCollocation`."""
+    """Cycles with a critical multiplier, on a `PeriodicEquations`."""
 
     @property
-    def cycles(self) -> PeriodicCollocation:
+    def cycles(self) -> PeriodicEquations:
         """The underlying system."""
-        return cast("PeriodicCollocation", self.base)
+        return cast(PeriodicEquations, self.base)
 
     @functools.cached_property
     def _folds(self) -> FoldCurve:

@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,14 @@ from contin.core.protocol import Discretization
 from contin.core.rounding import changes_of_multipliers
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial, sign_changed
+from contin.cycles.equations import PeriodicEquations
+from contin.cycles.map_equations import MapEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
 from contin.events.nearness import AS_FAR, CIRCLE, DEEPER, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.significance import on_finer_mesh
-
-if TYPE_CHECKING:
-    from contin.cycles.maps import MapSystem
-    from contin.cycles.system import PeriodicCollocation
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
@@ -148,12 +146,12 @@ def _apart(values: ComplexArray, others: ComplexArray) -> Array:
     return distances
 
 
-def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
+def _trivial(system: PeriodicEquations | MapEquations, x: Array) -> int | None:
     """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
     return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
 
 
-def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _NEARLY_ONE) -> int:
+def unstable(system: PeriodicEquations | MapEquations, x: Array, least: float = _NEARLY_ONE) -> int:
     """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
 
     Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:
@@ -166,7 +164,7 @@ def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _
     return int(np.count_nonzero(outside))
 
 
-def has_double_one(system: PeriodicCollocation, x: Array) -> bool:
+def has_double_one(system: PeriodicEquations, x: Array) -> bool:
     """Return whether a multiplier is 1 beside the one that always is, as far as can be told: that of a Jordan block may be off.
 
     In a conservative system it is along the whole family.
@@ -202,7 +200,7 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
     return {"frequency": math.pi, "pairs": 1}
 
 
-def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> SpecialPoint:
+def doubled(system: PeriodicEquations | MapEquations, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a cycle comes to go twice round one of half its period.
 
     Beyond it the branch is itself, half a period on.
@@ -337,7 +335,7 @@ def _followed(arc: Arc, at: float, square: float, test: Event) -> Place | None:
             return None
 
 
-def critical_angle(system: PeriodicCollocation | MapSystem, point: Any, x: Array) -> float:
+def critical_angle(system: PeriodicEquations | MapEquations, point: Any, x: Array) -> float:
     """Return the angle of the pair on the circle at a torus bifurcation x: that of the point or, if unknown, of the nearest."""
     known = frequency_of(point)
     if known is not None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.core.trial import Event, Trial
+from contin.cycles.equations import PeriodicEquations
+from contin.cycles.map_equations import MapEquations
 from contin.defining.critical_curve import signed_smallest
 from contin.defining.fold_curve import NORMAL, normal_product, shrinking
-
-if TYPE_CHECKING:
-    from contin.cycles.maps import MapSystem
-    from contin.cycles.system import PeriodicCollocation
 
 #: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
 _REAL = 1e-12
@@ -20,7 +18,7 @@ _REAL = 1e-12
 _NORMAL_OF_MAPS = 1e-14
 
 
-def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
+def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
     """Return the test functions of points where a further multiplier is one, or another is -1, and of where cycles shrink.
 
     The change of g with the multiplier vanishes where a further one is one.

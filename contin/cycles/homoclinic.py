@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,14 +18,12 @@ from contin.arrays import Array, ComplexArray
 from contin.core.newton import correct
 from contin.core.state import Stop
 from contin.core.trial import Event, Trial, linearization
+from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
 from contin.problems.own_names import PERIOD
-
-if TYPE_CHECKING:
-    from contin.cycles.system import CycleCollocation
 
 #: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
 #: larger, homoclinic points are known to 1e-14 and not to the last digit.
@@ -105,7 +103,7 @@ def _speeds(system: Any, x: Array) -> Array:
     return speeds
 
 
-def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:
     """Return the equilibrium that Newton's method finds from where a cycle is slowest; None where it finds none.
 
     Returns
@@ -131,14 +129,14 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
     return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
 
 
-def _spectrum(system: CycleCollocation, x: Array, states: Array) -> ComplexArray:
+def _spectrum(system: CycleEquations, x: Array, states: Array) -> ComplexArray:
     """Return the eigenvalues of an equilibrium, the largest real part first."""
     values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
     found: ComplexArray = values[np.argsort(-values.real)]
     return found
 
 
-def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+def _fold_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:
     """Return the equilibrium of a saddle-node beside a cycle, as `equilibrium_beside` does; None where there is none.
 
     Beyond a saddle-node there is no equilibrium. That of the nearest value of the parameter p comes from Newton's method for
@@ -164,7 +162,7 @@ def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArra
     return None
 
 
-def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
+def resting_place(system: CycleEquations, x: Array) -> RestingPlace | None:
     """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
     points, speeds = system.at_gauss_points(x), _speeds(system, x)
     if not speeds.min() < _SLOW * speeds.max():
@@ -200,7 +198,7 @@ class Limit:
         return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
 
 
-def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) -> Limit | None:
+def limit_of_parameter(system: CycleEquations, x: Array, place: RestingPlace) -> Limit | None:
     """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
 
     Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, over the number of
@@ -227,7 +225,7 @@ def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) 
     return Limit(name, better, float(error)) if np.isfinite(error) else None
 
 
-def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
+def explained(system: CycleEquations, stop: Stop, x: Array) -> Stop:
     """Return the end of a branch, where the period runs away with the equilibrium near which the cycle spends its time.
 
     With the limit of the parameter, if it is known.
@@ -243,7 +241,7 @@ def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
     return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)
 
 
-def _extrapolated(system: CycleCollocation, x: Array, law: tuple[str, float], less: float) -> float:
+def _extrapolated(system: CycleEquations, x: Array, law: tuple[str, float], less: float) -> float:
     """Return p + (dp/dT) / k, for ``law`` (p, k), at a period that is shorter by some time.
 
     Raises

@@ -14,20 +14,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial
+from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.root import find_zero
 from contin.problems.own_names import PERIOD
-
-if TYPE_CHECKING:
-    from contin.cycles.system import CycleCollocation
 
 #: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
 _UPDATES = 20
@@ -44,7 +42,7 @@ _ON_AXIS = 1e-9
 AMPLITUDE = Event("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
-def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None:
+def hopf_point_inside(system: CycleEquations, arc: Arc) -> SpecialPoint | None:
     """Return the Hopf point inside a step of a branch of cycles, or None."""
     before, trial = arc.before.value(AMPLITUDE), arc.trial.value(AMPLITUDE)
     if not before > 0 > trial:
@@ -62,7 +60,7 @@ def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None
     return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)
 
 
-def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
+def shrunk(system: CycleEquations, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where cycles have shrunk onto an equilibrium.
 
     Beyond the Hopf point the branch is itself, half a period later.
@@ -73,7 +71,7 @@ def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
 
 
-def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:
+def _hopf_point(system: CycleEquations, guess: Array) -> tuple[Array, float, Array]:
     """Return the unknowns of the Hopf point near a small cycle, its frequency, and the errors of the free parameters.
 
     Raises
@@ -112,7 +110,7 @@ def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, A
     return x, frequency, errors
 
 
-def _critical(system: CycleCollocation, x: Array, states: Array, expected: complex) -> complex:
+def _critical(system: CycleEquations, x: Array, states: Array, expected: complex) -> complex:
     """Return the eigenvalue, nearest to an expected one, at the equilibrium that is put into ``states``, a view of x.
 
     Raises

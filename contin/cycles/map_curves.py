@@ -12,30 +12,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
 from contin.core.trial import Event
+from contin.cycles.map_equations import MapEquations
 from contin.cycles.map_normal_forms import period_doubling, torus
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.defining.extended import Borders
 from contin.events.coefficient import Coefficient
 from contin.linalg.dense import DenseFactors
 
-if TYPE_CHECKING:
-    from contin.cycles.maps import MapSystem
-
 
 class MapCurve(MultiplierCurve):
-    """Cycles of a map with a critical multiplier, on a `MapSystem`."""
+    """Cycles of a map with a critical multiplier, on a `MapEquations`."""
 
     @property
-    def cycles(self) -> MapSystem:
+    def cycles(self) -> MapEquations:
         """The underlying system."""
-        return cast("MapSystem", self.base)
+        return cast(MapEquations, self.base)
 
     @property
     def copy_shape(self) -> tuple[int, Array]:

@@ -26,17 +26,15 @@ supercritical. The sign of b depends on that of v, and its absolute value is giv
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.multilinear import of_complex
+from contin.cycles.map_equations import MapEquations
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
-
-if TYPE_CHECKING:
-    from contin.cycles.maps import MapSystem
 
 #: Rounds of inverse iteration for null vectors, from random borders of this seed, as for cycles of vector fields.
 _ROUNDS, _SEED = 3, 11
@@ -44,7 +42,7 @@ _ROUNDS, _SEED = 3, 11
 _MOST = 2000
 
 
-def at_special_point(system: MapSystem, point: SpecialPoint) -> Coefficient | None:
+def at_special_point(system: MapEquations, point: SpecialPoint) -> Coefficient | None:
     """Return the coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
     x = point.trial.x
     with np.errstate(all="ignore"):
@@ -55,24 +53,24 @@ def at_special_point(system: MapSystem, point: SpecialPoint) -> Coefficient | No
         return period_doubling(system, x) if point.label == "PD" else torus(system, x, point.details["frequency"])
 
 
-def fold(system: MapSystem, x: Array) -> Coefficient | None:
+def fold(system: MapEquations, x: Array) -> Coefficient | None:
     """Return the absolute value of b."""
     found = _coefficient(system, x, _of_fold)
     return None if found is None else Coefficient(abs(found.value), found.error, found.size)
 
 
-def period_doubling(system: MapSystem, x: Array) -> Coefficient | None:
+def period_doubling(system: MapEquations, x: Array) -> Coefficient | None:
     """Return c, which is positive where they are supercritical."""
     found = _coefficient(system, x, _of_period_doubling)
     return None if found is None else found._replace(side=-1)
 
 
-def torus(system: MapSystem, x: Array, angle: float) -> Coefficient | None:
+def torus(system: MapEquations, x: Array, angle: float) -> Coefficient | None:
     """Return the real part of d."""
     return _coefficient(system, x, lambda forms: _of_torus(forms, angle))
 
 
-def _coefficient(system: MapSystem, x: Array, terms: Callable[[_Forms], Array]) -> Coefficient | None:
+def _coefficient(system: MapEquations, x: Array, terms: Callable[[_Forms], Array]) -> Coefficient | None:
     """Return a coefficient from its terms; None for very long cycles, NaN where another multiplier makes it infinite."""
     if system.state_size > _MOST:
         return None
@@ -86,7 +84,7 @@ def _coefficient(system: MapSystem, x: Array, terms: Callable[[_Forms], Array]) 
 class _Forms:
     """The matrices M(mu) at one cycle, and the derivatives of the map."""
 
-    def __init__(self, system: MapSystem, x: Array) -> None:
+    def __init__(self, system: MapEquations, x: Array) -> None:
         self.system, self.x, size = system, x, system.state_size
         matrix = system.jacobian(x)
         self._closing = np.zeros((size, size))

@@ -29,20 +29,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.multilinear import of_complex
+from contin.cycles.equations import PeriodicEquations
 from contin.cycles.floquet import has_double_one
 from contin.cycles.round import Round, Solver
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.problems.own_names import PERIOD
-
-if TYPE_CHECKING:
-    from contin.cycles.system import PeriodicCollocation
 
 #: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
 _ROUNDS = 3
@@ -55,11 +53,11 @@ class NormalForms:
 
     Parameters
     ----------
-    system : PeriodicCollocation
+    system : PeriodicEquations
     x : ndarray, shape (size,)
     """
 
-    def __init__(self, system: PeriodicCollocation, x: Array) -> None:
+    def __init__(self, system: PeriodicEquations, x: Array) -> None:
         self.system, self.x = system, x
         self.plain = Round(system, x, phased=False)
         self.phased = self.plain.with_period() if system.autonomous else self.plain
@@ -184,7 +182,7 @@ class NormalForms:
         return result
 
 
-def at_special_point(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
+def at_special_point(system: PeriodicEquations, point: SpecialPoint) -> Coefficient | None:
     """Return the coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses.
 
     These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.

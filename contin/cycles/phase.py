@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.cycles.equations import CycleEquations, ForcedEquations
+from contin.cycles.map_equations import MapEquations
 from contin.problems.angles import whole_rounds
-
-if TYPE_CHECKING:
-    from contin.cycles.maps import MapSystem
-    from contin.cycles.system import CycleCollocation, ForcedCollocation
 
 #: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
 _PLACES = 2048
@@ -23,8 +21,8 @@ _SAME = 1e-4
 _STEPS = 5
 
 
-def lasting(system: CycleCollocation, x: Array) -> Array:
-    """Return what a shift in time leaves as it is, as `CycleCollocation.lasting` does."""
+def lasting(system: CycleEquations, x: Array) -> Array:
+    """Return what a shift in time leaves as it is, as `CycleEquations.lasting` does."""
     size, n = system.state_size, len(system.problem.state_names)
     states = x[:size].reshape(-1, n)[:, system.circles == 0]
     weights = system.weights[:size:n]
@@ -33,7 +31,7 @@ def lasting(system: CycleCollocation, x: Array) -> Array:
     return np.concatenate([x[size:], means, [np.sqrt(max(square, 0.0))]])
 
 
-def cycle_in_phase(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+def cycle_in_phase(system: CycleEquations, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
     """Return a cycle, and vectors at it, shifted in time to lie closest to another one."""
     shift, size = _shift(system, x, reference), system.state_size
     times = (system.nodes + shift) % system.order
@@ -45,7 +43,7 @@ def cycle_in_phase(system: CycleCollocation, x: Array, vectors: Sequence[Array],
 
 
 def forced_cycle_in_phase(
-    system: ForcedCollocation, x: Array, vectors: Sequence[Array], reference: Array
+    system: ForcedEquations, x: Array, vectors: Sequence[Array], reference: Array
 ) -> tuple[Array, list[Array]]:
     """Return a forced cycle, and vectors at it, so that it lies closest to another one.
 
@@ -76,7 +74,7 @@ def forced_cycle_in_phase(
     return orbit(nearest), [moved(vector, nearest) for vector in vectors]
 
 
-def map_in_phase(system: MapSystem, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+def map_in_phase(system: MapEquations, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
     """Return a cycle of a map, which may begin with any of its points, and vectors at it, to lie closest to another one."""
 
     def apart(shift: int) -> float:
@@ -90,7 +88,7 @@ def map_in_phase(system: MapSystem, x: Array, vectors: Sequence[Array], referenc
     return system.lifted(system.moved(x, nearest), reference), turned
 
 
-def _is_odd(system: ForcedCollocation, x: Array) -> bool:
+def _is_odd(system: ForcedEquations, x: Array) -> bool:
     """Return whether -u(t + T / 2) is a solution where u is one, T the period of the forcing; it never goes round as u."""
     if system.rotates:
         return False
@@ -100,7 +98,7 @@ def _is_odd(system: ForcedCollocation, x: Array) -> bool:
     return bool(np.abs(system.residual(image)).max() <= _SAME * size)
 
 
-def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
+def _shift(system: CycleEquations, x: Array, reference: Array) -> float:
     """Return the s at which the integral of |u(t + s) - v(t)|^2 is least, v the reference; angles up to whole rounds.
 
     With u = a t + w, where angles gain a in the whole cycle, and w periodic, it is the integral of w(t + s) . w_v(t), both

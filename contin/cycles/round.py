@@ -33,15 +33,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.cycles.equations import PeriodicEquations
 from contin.problems.own_names import PERIOD
-
-if TYPE_CHECKING:
-    from contin.cycles.system import PeriodicCollocation
 
 #: The seed of the rows H, which are random and orthonormal: thus they are in general position to the states at both ends that
 #: the collocation equations admit. With ten other seeds, a normal form at 16 states changes by 1e-13 of its value.
@@ -59,7 +57,7 @@ class Collocated:
         Number of rows of C.
     """
 
-    def __init__(self, system: PeriodicCollocation, x: Array) -> None:
+    def __init__(self, system: PeriodicEquations, x: Array) -> None:
         n = system.states_count
         rows = np.linalg.qr(np.random.default_rng(_SEED).standard_normal((2 * n, n)))[0].T
         self._factors = system.with_conditions(x, rows)
@@ -173,7 +171,7 @@ class Round:
 
     Parameters
     ----------
-    system : PeriodicCollocation
+    system : PeriodicEquations
     x : ndarray, shape (size,)
     phased : bool
         With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of autonomous
@@ -190,7 +188,7 @@ class Round:
     size: int
     collocated: Collocated
 
-    def __init__(self, system: PeriodicCollocation, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
+    def __init__(self, system: PeriodicEquations, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
         self.system, self.phased, self._x = system, phased, x
         self.states, self.n = system.state_size, system.states_count
         self.size = self.states + phased

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.equilibria.equations import AlgebraicEquations
 from contin.linalg.dense import DenseFactors
-
-if TYPE_CHECKING:
-    from contin.equilibria.system import Algebraic
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000
@@ -36,7 +33,7 @@ _PIVOT = 1e-6
 _TERMS = 6
 
 
-def dependence(system: Algebraic, x: Array) -> str:
+def dependence(system: AlgebraicEquations, x: Array) -> str:
     """Return which equations are dependent near x, or which states occur only together, as a sentence with advice; or ""."""
     if system.size != system.state_size or system.size > MOST_STATES:
         return ""
@@ -53,7 +50,7 @@ def dependence(system: Algebraic, x: Array) -> str:
     return _of_equations(system, places, equations, bool(len(states))) or _of_states(system, states)
 
 
-def _around(system: Algebraic, x: Array) -> list[Array]:
+def _around(system: AlgebraicEquations, x: Array) -> list[Array]:
     """Return places near x where the equations are defined; above x first, where logarithms and roots are."""
     random, found = np.random.default_rng(_SEED), []
     for sign in (1.0, 1.0, 1.0, -1.0, -1.0, -1.0):
@@ -107,7 +104,7 @@ def _first(vector: Array) -> int:
     return int(np.flatnonzero(vector)[0])
 
 
-def _of_equations(system: Algebraic, places: Sequence[Array], vectors: Array, is_shifted: bool) -> str:
+def _of_equations(system: AlgebraicEquations, places: Sequence[Array], vectors: Array, is_shifted: bool) -> str:
     """Return what is said of combinations of equations that are constants."""
     if not len(vectors):
         return ""
@@ -128,7 +125,7 @@ def _of_equations(system: Algebraic, places: Sequence[Array], vectors: Array, is
     return f"residual: {what}: put {condition} {totals}, where the equations are rates of these{held}, in place of {replaced}"
 
 
-def _of_states(system: Algebraic, vectors: Array) -> str:
+def _of_states(system: AlgebraicEquations, vectors: Array) -> str:
     if not len(vectors):
         return ""
     names = system.named_states

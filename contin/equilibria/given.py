@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.errors import ProblemError
-
-if TYPE_CHECKING:
-    from contin.equilibria.statement import AlgebraicProblem
 
 #: Length of differences of fourth order, relative to 1 + |u|; half of it serves the error estimate. Errors are below 1e-10 of
 #: the sizes of the terms.
@@ -21,7 +18,7 @@ _ASIDE = 0.05
 _SAFE, _LEAST = 20.0, 1e-9
 
 
-def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
+def check_given(problem: Any, u: Array, p: Array) -> None:
     """Compare a given Jacobian with differences of the residual along a random direction, the first time.
 
     Raises
@@ -50,7 +47,7 @@ def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
         raise ProblemError(_wrong_entry(problem, (here, p), matrix, int(np.argmax(excess))))
 
 
-def _slope(problem: AlgebraicProblem, u: Array, p: Array, direction: Array) -> tuple[Array, Array]:
+def _slope(problem: Any, u: Array, p: Array, direction: Array) -> tuple[Array, Array]:
     """Return the derivative of the residual along a direction, by differences of fourth order, and an estimate of its error."""
     batch, none = problem.batch("residual"), np.empty((0, u.size))
 
@@ -62,7 +59,7 @@ def _slope(problem: AlgebraicProblem, u: Array, p: Array, direction: Array) -> t
     return found[1], np.abs(found[1] - found[0])
 
 
-def _wrong_entry(problem: AlgebraicProblem, place: tuple[Array, Array], matrix: Any, row: int) -> str:
+def _wrong_entry(problem: Any, place: tuple[Array, Array], matrix: Any, row: int) -> str:
     """Return the sentence that names the entry of a row that differs most."""
     u, p = place
     given = matrix[[row]].toarray()[0] if hasattr(matrix, "toarray") else matrix[row]

@@ -11,18 +11,16 @@ the centre manifold. Where it is positive the bifurcation is subcritical.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.multilinear import of_complex
+from contin.equilibria.equations import AlgebraicEquations
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.linalg.orientation import oriented
-
-if TYPE_CHECKING:
-    from contin.equilibria.system import Algebraic
 
 
 class CriticalPair(NamedTuple):
@@ -73,7 +71,7 @@ _MANY = 200
 _ASIDE, _ITERATIONS = 1e-8, 4
 
 
-def at_hopf_point(system: Algebraic, point: SpecialPoint) -> Coefficient | None:
+def at_hopf_point(system: AlgebraicEquations, point: SpecialPoint) -> Coefficient | None:
     """Return the first Lyapunov coefficient where one pair crosses the axis; None at other special points."""
     if point.label != "HB" or not point.is_simple:
         return None
@@ -81,7 +79,7 @@ def at_hopf_point(system: Algebraic, point: SpecialPoint) -> Coefficient | None:
     return first_lyapunov(system, point.trial.x, pair)
 
 
-def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
+def first_lyapunov(system: AlgebraicEquations, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
     size, field, one = system.scales.states, system.as_field(), np.eye(system.state_size)
 

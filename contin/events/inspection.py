@@ -290,7 +290,8 @@ class Inspection:
     @functools.cached_property
     def _own_home(self) -> SpecialPoint | None:
         """The end of the branch that the kind of problem knows."""
-        return self.arc.trial.system.home(self.arc)
+        found: SpecialPoint | None = self.arc.trial.system.home(self.arc)
+        return found
 
     @functools.cached_property
     def _home(self) -> SpecialPoint | None:

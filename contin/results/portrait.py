@@ -76,7 +76,7 @@ def _known(system: Collocation) -> tuple[str, ...]:
     """Return the names of the states; of segments each name once, in order."""
     problem = system.problem
     if not problem.pieces:
-        return problem.state_names
+        return tuple(problem.state_names)
     return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
 
 

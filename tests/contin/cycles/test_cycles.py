@@ -8,7 +8,7 @@ import pytest
 import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
 from contin.continuation import lane
-from contin.cycles import system as cycles
+from contin.cycles import equations as cycles
 
 
 def circle(u, p):

@@ -11,7 +11,7 @@ from contin.core.step import corrected, predict
 from contin.core.trial import linearization
 from contin.events.arc import Arc
 from contin.events.folds import FoldSearch
-from contin.events.test_functions import fold
+from contin.events.usual import fold
 from contin.lowlevel import Algebraic
 
 

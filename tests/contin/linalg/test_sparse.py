@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 
 from contin import AlgebraicProblem, solve, trace
-from contin.equilibria import system as algebraic
+from contin.equilibria import equations as algebraic
 from contin.linalg.dense import DenseFactors
 from contin.linalg.sparse import SparseFactors
 

@@ -1,4 +1,4 @@
-"""Test functions of user zeros, limits and folds, and what the coefficient of a normal form adds to a special point."""
+"""Events that every run may ask for: user zeros, limits and folds; what the coefficient of a normal form adds to a point."""
 
 from __future__ import annotations
 

@@ -1,0 +1,473 @@
+"""Collocation of connecting orbits: projection conditions at the ends, and a phase condition."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.boundary.conditions import Conditioned
+from contin.boundary.system import Collocation
+from contin.collocation.mesh import MeshControl
+from contin.core.multilinear import Numbers, shares, subsets
+from contin.core.protocol import Carrier
+from contin.core.scales import Scales
+from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
+from contin.problems.angles import WINDING, check_windings
+
+#: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
+_MOVED = 1e-6
+#: Number of places whose subspaces are kept: a step asks for those of a few iterates.
+_KEPT = 8
+
+
+class ConnectionEquations(Conditioned):
+    """A `ConnectionProblem` on a mesh.
+
+    The conditions beyond collocation are rows of their own,
+
+        [ collocation              ]        L spans the left eigenvectors of the first equilibrium e whose eigenvalues are
+        [ F(e) = 0, F(e') = 0      ]        stable, so u(0) - e lies in the tangent plane of its unstable manifold; L' spans
+        [ L (u(0) - e)             ]        those of the last equilibrium e' whose eigenvalues are unstable.
+        [ L' (u(1) - e')           ]
+        [ g(e)                     ]        of orbits to a saddle-node only; L and L' leave out its eigenvalue zero
+        [ integral of (u - v) . v' ]        v is an earlier orbit of the run.
+
+    L is normalized to L Q^T = I, with an orthonormal basis Q of an earlier L, so that it changes smoothly. With the Jacobian A
+    at e, and the singular vectors b, c of the smallest singular value of an earlier one,
+
+        [ A    b ] [ y ]   [ 0 ]
+        [ c^T  0 ] [ g ] = [ 1 ],        which makes g zero where A is singular.
+
+    Attributes
+    ----------
+    reference : ndarray, shape (size,)
+        The vector of unknowns at which v and Q were taken; empty where `with_reference` was not called.
+    """
+
+    problem: Any
+
+    plain = False
+
+    def __init__(
+        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        check_windings(problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
+        self.reference: Array = np.empty(0)
+
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
+        self.equations = self._conditions + self._further
+
+    @property
+    def _further(self) -> int:
+        """Number of conditions beyond collocation and the equilibria."""
+        return int(sum(self.problem.conditions) + self.problem.saddle_node + 1)
+
+    def with_reference(self, x: Array) -> Self:
+        """Return the same with v and Q of the orbit x."""
+        other = self._copied()
+        other._known_subspaces = {}
+        other.reference = np.array(x)
+        other._phase = other.phase_row(other._scaled_states(x))
+        other._target = float(other._phase @ x)
+        other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)))
+        left, _, right = np.linalg.svd(other.saddle_jacobian(x))
+        other._borders = left[:, -1], right[-1]
+        return other
+
+    _phase: Array
+    _target: float
+    _bases: Any
+    _borders: tuple[Array, Array]
+
+    # --- the conditions at the ends ------------------------------------------------------------------------------
+
+    def _places(self, p: Array) -> list[Array]:
+        """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
+        n, first = self._n, self._first_coordinate
+        if not self.problem.homoclinic:
+            return [p[:, place : place + n] for place in (first, first + n)]
+        here = p[:, first : first + n]
+        if not self.problem.angles:
+            return [here, here]
+        gained, names = np.zeros((len(p), n)), list(self.problem.parameters)
+        for name, period in self.problem.angles.items():
+            gained[:, self.problem.state_names.index(name)] = period * p[:, names.index(WINDING + name)]
+        return [here, here + gained]
+
+    @functools.cached_property
+    def _first_coordinate(self) -> int:
+        """Where the coordinates of the equilibria begin among all parameters."""
+        return list(self.problem.parameters).index(self.problem.multipliers[0])
+
+    def _jacobian_at(self, place: Array, p: Array) -> Array:
+        """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
+        batch, n, sizes = self.problem.batch("vector field"), self._n, self.scales.states
+        jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
+        return jacobian * sizes / sizes[:, None]
+
+    def _left_vectors(self, p: Array) -> list[Array]:
+        """Return bases of the spaces of L and L' for values of all parameters, not normalized."""
+        places = self._places(p[None])
+        return [
+            _left_subspace(self._jacobian_at(place[0], p), count, stable=end == 0)
+            for end, (place, count) in enumerate(zip(places, self.problem.conditions))
+        ]
+
+    def _subspaces_along(self, p: Array, directions: Sequence[Array]) -> list[dict[Numbers, Array]]:
+        """Return L, and then L', with their derivatives along directions of all parameters, for all subsets of the directions.
+
+        L is where R = L A P vanishes, with P = I - Q^T L. The derivatives of the three factors are shared out in all ways. The
+        unknown one, X, comes twice, X A P - L A Q^T X, and X Q^T = 0: X = Y N^T with the orthonormal N of the complement of Q
+        leaves Sylvester's equation for Y.
+        """
+        found: list[dict[Numbers, Array]] = []
+        numbers = subsets(len(directions))
+        for end, (Q, L, solve) in enumerate(self._subspaces(p)):
+            if not (len(Q) and directions):
+                found.append(dict.fromkeys(numbers, L))
+                continue
+            known: dict[Numbers, Array] = {(): L}
+            field = self._jacobians_along(p, directions, end)
+            for chosen in numbers[1:]:
+                right: Any = sum(known[u] @ field[v] for u, v in shares(chosen, 2) if u != chosen)
+                for u, v, w in shares(chosen, 3):
+                    if chosen not in (u, w):
+                        right = right - known[u] @ field[v] @ Q.T @ known[w]
+                known[chosen] = solve(right)
+            found.append(known)
+        return found
+
+    def _subspaces(self, p: Array) -> list[tuple[Array, Array, Callable[[Array], Array]]]:
+        """Return Q and L of both ends, and what solves X A P - L A Q^T X = -right for X, once for values of all parameters."""
+        key = p.tobytes()
+        if key not in self._known_subspaces:
+            if len(self._known_subspaces) > _KEPT:
+                self._known_subspaces.clear()
+            self._known_subspaces[key] = [self._subspace(p, end) for end in (0, 1)]
+        return self._known_subspaces[key]
+
+    @functools.cached_property
+    def _known_subspaces(self) -> dict[bytes, list[tuple[Array, Array, Callable[[Array], Array]]]]:
+        return {}
+
+    def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        A, Q = self._jacobian_at(self._places(p[None])[end][0], p), self._bases[end]
+        L, N = _normalized(_left_subspace(A, self.problem.conditions[end], stable=end == 0), Q), self._complements[end]
+        made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
+        return Q, L, lambda right: made()(-right @ N) @ N.T
+
+    @functools.cached_property
+    def _complements(self) -> list[Array]:
+        """The orthonormal N of the complements of Q."""
+        from scipy.linalg import null_space  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+        return [null_space(Q) if len(Q) else np.eye(self._n) for Q in self._bases]
+
+    def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
+        """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""
+        batch, sizes = self.problem.batch("vector field"), self.scales.states
+        place = self._places(p[None])[end]
+        moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
+        given = np.zeros(1), place, np.empty((0, self._n)), p, batch.columns([])
+        found = {
+            chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, : self._n] * sizes / sizes[:, None]
+            for chosen in subsets(len(directions))[1:]
+        }
+        return {(): self._jacobian_at(place[0], p), **found}
+
+    def _fold_along(self, p: Array, directions: Sequence[Array]) -> dict[Numbers, Array]:
+        """Return g, shape (1,), with its derivatives along all subsets of the directions; of a saddle, shape (0,)."""
+        numbers = subsets(len(directions))
+        if not self.problem.saddle_node:
+            return dict.fromkeys(numbers, np.empty(0))
+        known = self._fold_vectors(self._jacobians_along(p, directions, 0), numbers)
+        return {chosen: vector[-1:] for chosen, vector in known.items()}
+
+    def _fold_vectors(self, field: dict[Numbers, Array], numbers: Sequence[Numbers]) -> dict[Numbers, Array]:
+        """Return (y, g), shape (n + 1,), with derivatives."""
+        n, (b, c) = self._n, self._borders
+        matrix = np.block([[field[()], b[:, None]], [c[None], np.zeros((1, 1))]])
+        known: dict[Numbers, Array] = {}
+        for chosen in numbers:
+            right: Array = np.zeros(n + 1)
+            right[n] = not chosen
+            for u, v in shares(chosen, 2):
+                right[:n] -= field[u] @ known[v][:n] if u else 0.0
+            known[chosen] = np.linalg.solve(matrix, right)
+        return known
+
+    def _conditions_at_ends(self, x: Array, names: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Return the projection, fold and phase conditions, their derivatives by the states, and by parameters."""
+        p, places = self.all_parameters(x), self._indices(names)
+        values, by_states = [], np.zeros((self._further, self.state_size))
+        by_parameters = np.zeros((self._further, len(names)))
+        if len(names):
+            by_parameters[:-1] = self._by_parameters(x, p, self._unit_directions(places))
+        for end, (here, at, L) in enumerate(self._end_places(self._subspaces_along(p, []))):
+            values.append(L[()] @ self.apart(x)[end])
+            by_states[here, at : at + self._n] = L[()]
+        values.append(self._fold_along(p, [])[()])
+        values.append(np.array([self._phase @ x - self._target]))
+        by_states[-1] = self._phase[: self.state_size]
+        return np.concatenate(values), by_states, by_parameters
+
+    def _by_parameters(self, x: Array, p: Array, directions: Array) -> Array:
+        """Return the derivatives of projection and fold conditions along directions (m, all parameters), as columns."""
+        batch, n, sizes, count, found = self.problem.batch("vector field"), self._n, self.scales.states, len(directions), []
+        for (Q, L, solve), here, moves, apart in zip(
+            self._subspaces(p), self._places(p[None]), self._places(directions), self.apart(x)
+        ):
+            given = np.zeros(count), np.repeat(here, count, axis=0), np.empty((0, n)), p, batch.columns([])
+            fields = batch.jacobian_along(*given, [np.hstack([moves, directions])])[:, :, :n] * sizes / sizes[:, None]
+            turned = [solve(each) for each in L @ fields @ (np.eye(n) - Q.T @ L)]
+            found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves / sizes).T)
+        if self.problem.saddle_node:
+            found.append(np.column_stack([self._fold_along(p, [each])[0,] for each in directions]))
+        return np.vstack(found)
+
+    def _unit_directions(self, places: Indices) -> Array:
+        """Return directions of all parameters, one for each of some of them, shape (m, number of names)."""
+        units: Array = np.eye(len(self.parameters))[places]
+        return units
+
+    def _end_places(self, subspaces: list[dict[Numbers, Array]]) -> list[tuple[slice, int, dict[Numbers, Array]]]:
+        """Return of both ends the rows of the projection conditions, the place of the states in x, and L with derivatives."""
+        first, last = (len(known[()]) for known in subspaces)
+        rows = slice(0, first), slice(first, first + last)
+        return list(zip(rows, (0, self.state_size - self._n), subspaces))
+
+    def _end_rows(
+        self, x: Array, subspaces: list[dict[Numbers, Array]], states: Sequence[Array], parameters: Sequence[Array]
+    ) -> Array:
+        """Return the derivative of the projection conditions L (u - e) along directions of the states and of all parameters."""
+        every, result = tuple(range(len(states))), []
+        for end, (_, at, L) in enumerate(self._end_places(subspaces)):
+            value = L[every] @ self.apart(x)[end]
+            for i in every:
+                change = states[i][at : at + self._n] - self._places(parameters[i][None])[end][0] / self.scales.states
+                value = value + L[every[:i] + every[i + 1 :]] @ change
+            result.append(value)
+        return np.concatenate(result)
+
+    def _directions_of(self, v: Array) -> tuple[Array, Array]:
+        """Return a direction of x as one of the states and one of all parameters, in the user's units."""
+        parameters = np.zeros(len(self.parameters))
+        parameters[self._free] = v[self.state_size :] * self.free_scales
+        return v[: self.state_size], parameters
+
+    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of these conditions along several directions; the phase condition is linear."""
+        states, parameters = zip(*(self._directions_of(v) for v in directions))
+        p, every = self.all_parameters(x), tuple(range(len(directions)))
+        rows = self._end_rows(x, self._subspaces_along(p, parameters), states, parameters)
+        return np.concatenate([rows, self._fold_along(p, parameters)[every], [0.0]])
+
+    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(their derivative along v) by x: by the states at the ends, and by each free parameter."""
+        result, p, (states, along) = np.zeros(self.size), self.all_parameters(x), self._directions_of(v)
+        for here, at, L in self._end_places(self._subspaces_along(p, [along])):
+            result[at : at + self._n] += w[here] @ L[0,]
+        still = np.zeros(self.state_size)
+        for place, unit in enumerate(self._unit_directions(self._free)):
+            own = unit * self.free_scales[place]
+            rows = self._end_rows(x, self._subspaces_along(p, [along, own]), [states, still], [along, own])
+            result[self.state_size + place] = w[:-1] @ np.append(rows, self._fold_along(p, [along, own])[0, 1])
+        return result
+
+    def condition_values(self, x: Array) -> Array:
+        """Return the projection, fold and phase conditions."""
+        return self._conditions_at_ends(x, ())[0]
+
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return these conditions and their derivatives by x."""
+        values, by_states, by_parameters = self._conditions_at_ends(x, self.free)
+        return values, np.hstack([by_states, by_parameters * self.free_scales])
+
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of these conditions by any parameters."""
+        by_parameters = self._conditions_at_ends(x, names)[2]
+        found: Array = by_parameters * self.scales.parameters[self._indices(names)]
+        return found
+
+    # --- for special points of homoclinic orbits -----------------------------------------------------------------
+
+    def saddle_jacobian(self, x: Array) -> Array:
+        """Return the derivatives of the field by the states at the first equilibrium, scaled, shape (n, n)."""
+        p = self.all_parameters(x)
+        return self._jacobian_at(self._places(p[None])[0][0], p)
+
+    def slow_motion(self, x: Array) -> tuple[Array, float]:
+        """Return p and a of a saddle-node: its slow motion is c' = a c^2, with c = p.(u - e) and p.q = 1, |q| = 1.
+
+        p and q are the left and right eigenvectors of the eigenvalue zero.
+        """
+        values, (b, c) = self.all_parameters(x), self._borders
+        jacobian = self.saddle_jacobian(x)
+        bordered = np.block([[jacobian, b[:, None]], [c[None], np.zeros((1, 1))]])
+        unit = np.append(np.zeros(self._n), 1.0)
+        q, p = (np.linalg.solve(matrix, unit)[:-1] for matrix in (bordered, bordered.T))
+        q /= np.linalg.norm(q)
+        bent = self._bent_jacobian(values, q, 0) @ q
+        return p / (p @ q), float(p @ bent / (p @ q)) / 2
+
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return what the ends on tangent planes, in place of the manifolds, change, a row for each projection condition.
+
+        In the plane N z at an end the manifold is L (u - e) = H (z, z) + ..., with
+
+            H (K x I + I x K) - M H = L B(N, N) / 2,        A N = N K,  L A = M L,
+
+        B the second derivatives. Each condition is changed by that, and by an estimate of the next term, which is not known:
+        the third power of the distance, over the square of the orbit's size.
+        """
+        from scipy.linalg import null_space, solve_sylvester  # .1 s; only this needs it
+
+        p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
+        amounts: list[float] = []
+        for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
+            if not len(L):
+                continue
+            A, L, N = self._jacobian_at(self._places(p[None])[end][0], p), _normalized(L, self._bases[end]), null_space(L)
+            K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
+            bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
+            H = solve_sylvester(-M, np.kron(K, unit) + np.kron(unit, K), bent)
+            z = N.T @ apart
+            amounts += [*(np.abs(H @ np.kron(z, z)) + float(np.linalg.norm(apart)) ** 3 / size**2)]
+        right_sides = np.zeros((len(amounts), self.equations + 1))
+        right_sides[range(len(amounts)), range(self._conditions, self._conditions + len(amounts))] = amounts
+        solved: Array = factors.solve(right_sides)
+        return solved
+
+    def _bent_jacobian(self, p: Array, direction: Array, end: int) -> Array:
+        """Return the derivative of the Jacobian at an equilibrium along a direction of the states, both scaled."""
+        moved = np.zeros(len(self.parameters))
+        names = self.problem.multipliers
+        own = names[: self._n] if end == 0 or self.problem.homoclinic else names[self._n :]
+        moved[self._indices(own)] = direction * self.scales.states
+        return self._jacobians_along(p, [moved], end)[0,]
+
+    def apart(self, x: Array) -> tuple[Array, Array]:
+        """Return u(0) - e and u(1) - e', scaled."""
+        first, last = (place[0] / self.scales.states for place in self._places(self.all_parameters(x)[None]))
+        states = self._scaled_states(x)
+        return states[0] - first, states[-1] - last
+
+    def adjoint_at_ends(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """Return L^T w and L'^T w, of the entries of a left vector that belong to the projection conditions."""
+        first, last = (known[()] for known in self._subspaces_along(self.all_parameters(x), []))
+        own = w[-self._further :]
+        return first.T @ own[: len(first)], last.T @ own[len(first) : len(first) + len(last)]
+
+    # --- columns -------------------------------------------------------------------------------------------------
+
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """No functional is an integral."""
+        return ()
+
+    def functionals(self, x: Array) -> Array:
+        """Return the gap: the largest distance of an end from its equilibrium, over the size of the orbit."""
+        states, places = self.states(x), self._places(self.all_parameters(x)[None])
+        apart = [float(np.abs(states[-end] - place[0]).max()) for end, place in enumerate(places)]
+        return np.array([max(apart) / (float(np.ptp(states, axis=0).max()) or 1.0)])
+
+    # --- meshes and references -----------------------------------------------------------------------------------
+
+    def _with(self, **changes: Any) -> ConnectionEquations:
+        other: Any = super()._with(**changes)
+        if self.reference.size:
+            other = other.with_reference(self._carried(other))
+        found: ConnectionEquations = other
+        return found
+
+    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
+        """Return the same on another mesh, with the same reference, and the carrier."""
+        other, carry = super().on_mesh(mesh)
+        return other.with_reference(carry(self.reference)) if self.reference.size else other, carry
+
+    def _carried(self, other: Any) -> Array:
+        """Return the reference as a vector of unknowns of another system of this problem."""
+        states = self.states(self.reference)
+        names = list(self.problem.parameters)
+        carried: Array = other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
+        return carried
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+        """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
+        mesh = self._better_mesh(x, control)
+        if mesh is None and np.abs(x - self.reference).max() <= _MOVED * np.abs(x).max():
+            return None
+        renewed = self.with_reference(x)
+        return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
+
+
+def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
+    """Return a basis (count, n) of the left eigenvectors with the ``count`` least (stable) or largest real parts.
+
+    Raises
+    ------
+    ConvergenceError
+        The equilibrium has not so many.
+    """
+    from scipy.linalg import schur  # .1 s; only this needs it
+
+    if not np.isfinite(jacobian).all():
+        raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
+    rates = np.sort(np.linalg.eigvals(jacobian).real)
+    n = len(rates)
+    if count == 0:
+        return np.empty((0, n))
+    sign = 1.0 if stable else -1.0
+    rates = rates if stable else -rates[::-1]
+    bound = sign * (rates[count - 1] + rates[count]) / 2 if count < n else sign * np.inf
+    chosen = (lambda re, im: re < bound) if stable else (lambda re, im: re > bound)
+    _, vectors, found = schur(jacobian.T, sort=chosen)
+    if found != count:
+        raise ConvergenceError(f"the equilibrium has not {count} eigenvalues of one kind")
+    return np.ascontiguousarray(vectors[:, :count].T)
+
+
+def _sylvester(a: Array, b: Array) -> Callable[[Array], Array]:
+    """Return what solves a X + X b = right for X, as SciPy's ``solve_sylvester`` does, with the Schur forms made once."""
+    from scipy.linalg import schur
+    from scipy.linalg.lapack import dtrsyl  # type: ignore[import-untyped]
+
+    if not (a.size and b.size):
+        return lambda right: np.zeros((len(a), len(b)))
+    (r, u), (s, v) = schur(a), schur(b.T)
+
+    def solve(right: Array) -> Array:
+        found, scale, _ = dtrsyl(r, s, u.T @ right @ v, tranb="C")
+        result: Array = u @ (scale * found) @ v.T
+        return result
+
+    return solve
+
+
+def _normalized(left: Array, basis: Array) -> Array:
+    """Return the basis L of the space of ``left`` with L Q^T = I, for the basis Q of a space near by.
+
+    Raises
+    ------
+    ConvergenceError
+        A direction of one space is orthogonal to the other one: L has no finite entries.
+    """
+    try:
+        return np.asarray(np.linalg.solve(left @ basis.T, left), dtype=float)
+    except np.linalg.LinAlgError:
+        raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step") from None
+
+
+def _orthonormal(left: Array) -> Array:
+    """Return the orthonormal basis of the same space that is closest to a basis."""
+    u, _, v = np.linalg.svd(left, full_matrices=False)
+    found: Array = u @ v
+    return found

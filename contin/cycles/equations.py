@@ -1,0 +1,543 @@
+"""Collocation of periodic orbits: Floquet multipliers, and without forcing a phase condition with a moving reference."""
+
+from __future__ import annotations
+
+import functools
+import math
+import threading
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray, Indices, Mask
+from contin.boundary.conditions import Conditioned
+from contin.boundary.system import Collocation
+from contin.collocation.extremes import extremes
+from contin.collocation.mesh import MeshControl
+from contin.collocation.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
+from contin.core.protocol import Carrier
+from contin.core.rounding import on_circle
+from contin.core.scales import Scales
+from contin.errors import ProblemError
+from contin.functions.batch import Columns
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+from contin.linalg.layout import Blocks
+from contin.linalg.periodic import log_eigenvalues_along
+from contin.linalg.transitions import interval_matrices
+from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
+from contin.problems.own_names import PERIOD, rounds_of
+
+#: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
+#: square root.
+_OPPOSITE = 1e-6
+#: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
+_SPLIT = 100.0
+#: Multipliers of so many orbits are kept.
+_KEPT = 50
+#: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
+_SHRUNK = 1e-7
+#: Share of the period's relative change in the length of a step: weight of (change of T)^2 / (1 + T)^2. With 1 in place of it
+#: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
+#: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
+_PERIOD_SHARE = 0.1
+#: The reference is renewed where an orbit differs from it by more than this part of its size.
+_MOVED = 1e-6
+
+
+#: Free parameters are multiplied by this to see whether a break of the forcing moves; it stands still within so much.
+_OTHERWISE, _STILL = 1.01, 1e-9
+
+
+class PeriodicEquations(Collocation):
+    """A `CycleProblem` on a mesh: what forced and autonomous ones share.
+
+    Attributes
+    ----------
+    autonomous : bool
+        There is no forcing: the period is unknown, and an orbit may be shifted in time.
+    """
+
+    problem: Any
+    autonomous = True
+    #: Twice those of other problems: with these, branches of Lorenz's cycles and of AUTO's pp2 take 15 orbits for 19, and 10
+    #: for 15, and all special points of the tests' cycles are found.
+    aims = 0.7, 0.05
+
+    def __init__(
+        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        self.order = problem.order
+        self._turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
+        values = dict(zip(problem.parameters, map(float, self.parameters)))
+        check_windings(problem.angles, self.free, values)
+        #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
+        self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
+
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
+        self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
+
+    @property
+    def turn(self) -> Array:
+        """The matrix S of the symmetry u(1) = S u(0), of states divided by their sizes; the identity where there is none."""
+        return self._turn
+
+    def duration(self, x: Array) -> float:
+        """Return the period."""
+        return float(self.problem.duration(dict(zip(self.problem.parameters, map(float, self.all_parameters(x))))))
+
+    def unit_time(self, x: Array) -> float:
+        """Return the time that the unit interval stands for: the period divided by the order of the symmetry."""
+        return self.duration(x) / self.order
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, up to the square root of round-off.
+
+        With a symmetry S of odd order the part computed is then twice one with the symmetry S^((n + 1) / 2), whose square is
+        S; with one of even order, it never is.
+        """
+        if self.order % 2 == 0:
+            return False
+        states = self.states(x)
+        half = np.linalg.matrix_power(self.problem.symmetry, (self.order + 1) // 2) if self.order > 1 else None
+        later = self.evaluate(x, (self.nodes + 0.5) % self.order)
+        states = states if half is None else states @ half.T
+        apart = states - later
+        apart = apart - whole_rounds(apart, periods_of(self.problem))
+        return bool(np.all(np.abs(apart).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
+    def _interpolated(self, x: Array, times: Array) -> Array:
+        """Return the piecewise polynomial of the values in x, beyond the unit interval by the symmetry, without gains."""
+        turns = _turns(times)
+        values = super()._interpolated(x, times - turns)
+        if self.order == 1 or not turns.any():
+            return values
+        powers = np.array([np.linalg.matrix_power(self.turn, k) for k in range(self.order)])
+        found: Array = np.einsum("mab,mb->ma", powers[turns % self.order], values)
+        return found
+
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """Return the states at ``times`` (m,), any number of rounds on, shape (m, n)."""
+        states, turns = super().evaluate(x, times), _turns(times)
+        if not self.rotates or not turns.any():
+            return states
+        rounds, parts = np.divmod(turns, self.order)
+        found: Array = states + rounds[:, None] * self.gains[-1] + self.gains[parts]
+        return found
+
+    def perturbation(self, v: Array, times: Array) -> Array:
+        """Return the states of a perturbation, divided by their sizes, at ``times`` (m,), shape (m, n): angles gain nothing."""
+        return self._interpolated(v, times)
+
+    def evaluate_scaled(self, x: Array, times: Array) -> Array:
+        """Return the states divided by their sizes at ``times`` (m,), any number of rounds on, shape (m, n)."""
+        return self.evaluate(x, times) / self.scales.states
+
+    def moved(self, x: Array, shift: float) -> Array:
+        """Return a cycle that begins later by ``shift``, in units of the part that is computed."""
+        if shift == 0:
+            return x.copy()
+        return np.concatenate([self.evaluate_scaled(x, self.nodes + shift).ravel(), x[self.state_size :]])
+
+    @property
+    def rotates(self) -> bool:
+        """An angle goes round."""
+        return bool(self.gains.any())
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that they are nearest to those of a reference in the mean."""
+        if not self.circles.any():
+            return x
+        apart = self._scaled_states(reference) - self._scaled_states(x)
+        moved = x.copy()
+        self._scaled_states(moved)[:] += whole_rounds(self.weights[: self.state_size : self._n] @ apart, self.circles)
+        return moved
+
+    # --- columns -------------------------------------------------------------------------------------------------
+
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are means over a period."""
+        return tuple(self.problem.means)
+
+    def functionals(self, x: Array) -> Array:
+        """Return the largest and smallest values of each state, and the means of the user's functionals.
+
+        An angle that rotates takes all values: the largest is half a period, the smallest minus that.
+        """
+        found = extremes(self.degree, *self._whole(x), self._n)
+        round_ = self.gains[-1] != 0
+        found[round_] = self.circles[round_, None] * [0.5, -0.5]
+        found *= self.scales.states[:, None]
+        own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
+        means = super().functionals(x) if self.problem.means else np.empty(0)
+        return np.concatenate([found.ravel(), own, means])
+
+    def _whole(self, x: Array) -> tuple[Array, Array]:
+        """Return the mesh and the values at the nodes over the whole orbit, on the unit interval."""
+        if self.order == 1:
+            return self.mesh, x
+        states = x[: len(self.nodes) * self._n].reshape(-1, self._n)
+        gains = self.gains / self.scales.states
+        parts = [states @ np.linalg.matrix_power(self.turn, k).T + gains[k] for k in range(self.order)]
+        values = np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
+        mesh = (np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order
+        return np.append(mesh, 1.0), values.ravel()
+
+    # --- stability -----------------------------------------------------------------------------------------------
+
+    @property
+    def by_interval(self) -> Indices:
+        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
+        return self._by_interval
+
+    def rates_by_states(self, x: Array, points: Array) -> Array:
+        """Return the derivatives of T F by the states at states (K, n) divided by their sizes, shape (K, n, n).
+
+        Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
+        """
+        n, times = self._n, np.zeros(len(points)) if self.autonomous else self._times
+        given = times, points, np.empty((0, n)), self._scaled_parameters(x)
+        derivatives: Array = self._field.jacobian(*given, self._by_states)[1]
+        return derivatives[:, :n, :n]
+
+    @functools.cached_property
+    def _by_states(self) -> Columns:
+        """Columns of the field's derivatives by the states."""
+        found: Columns = self.problem.batch("field").columns([])
+        return found
+
+    def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""
+        still, none = np.zeros(self.size), np.empty((0, self._n))
+        wide = [self._wide(still, states) for states in directions]
+        points, p = self.at_gauss_points(x), self._scaled_parameters(x)
+        found: Array = self._field.along(self._times, points, none, p, wide)[:, : self._n]
+        return found
+
+    def _jacobian_of_field(self, x: Array) -> Array:
+        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
+        return self.rates_by_states(x, self.at_gauss_points(x))
+
+    def with_conditions(self, x: Array, rows: Array) -> Factors:
+        """Return the factored linearized collocation equations with n conditions on the states at both ends: rows (n, 2 n)."""
+        jacobian, n = self._jacobian_of_field(x), self._n
+        matrices = interval_matrices(self.basis.value, self.basis.slope, self._h, jacobian)
+        columns = np.concatenate([self._layout.inside, self._layout.ends])
+        border = np.empty((self.intervals, 0, len(columns)))
+        local = np.ascontiguousarray(matrices[:, self._layout.rows[:, None], columns])
+        first, last = np.ascontiguousarray(rows[:, :n]), np.ascontiguousarray(rows[:, n:])
+        return Factorization(self._layout, Blocks(local, border, np.empty((0, 0)), first, last))
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.
+
+        That of a pair on the unit circle, to round-off, has the real part zero. With a symmetry of order n they are those of
+        the map over one n-th of the period, S^-1 times its monodromy matrix; see `whole_round`.
+        """
+        return self._multipliers(x)[0]
+
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the logarithms of the multipliers at several places."""
+        return [self.eigenvalues(x) for x in places]
+
+    def neutral(self, x: Array) -> Mask:
+        """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""
+        return self._multipliers(x)[1]
+
+    def computed_eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
+        return self._multipliers(x)[2]
+
+    def _multipliers(self, x: Array) -> tuple[ComplexArray, Mask, ComplexArray]:
+        """Return the logarithms of the multipliers, which lie on the unit circle, and all as computed, once."""
+        key = x.tobytes()
+        if key not in self._known:
+            if len(self._known) > _KEPT:
+                self._known.clear()
+            values = self._computed(x)
+            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
+            self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral, values
+        return self._known[key]
+
+    @functools.cached_property
+    def _monodromies(self) -> dict[int, Monodromy]:
+        """Where multipliers are computed, by thread."""
+        return {}
+
+    def _filled(self, x: Array) -> tuple[Monodromy, int]:
+        """Return where a kernel has computed the logarithms of the multipliers, and what came of it."""
+        thread = threading.get_ident()
+        if thread not in self._monodromies:
+            self._monodromies[thread] = monodromy_of(self)
+        room = self._monodromies[thread]
+        room.jacobian[:] = self._jacobian_of_field(x)
+        return room, fill_multipliers(room, 0)
+
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
+        room, _ = self._filled(x)
+        return room.real + 1j * room.imaginary
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
+        return False
+
+    def whole_round(self, values: ComplexArray) -> ComplexArray:
+        """Return the logarithms of the multipliers over the whole period, n times those over one n-th of it."""
+        if self.order == 1:
+            return values
+        angles = self.order * values.imag
+        found: ComplexArray = self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
+        return found
+
+    @abstractmethod
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
+
+
+class ForcedEquations(PeriodicEquations):
+    """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.
+
+    Raises
+    ------
+    ProblemError
+        ``rounds`` is no whole number, or free; the period is no positive number.
+    """
+
+    autonomous = False
+
+    def __init__(
+        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        values = dict(zip(self.problem.parameters, map(float, self.parameters)))
+        self.rounds = rounds_of(self.free, values)
+        problem.duration(values)
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
+        return self.rounds % 2 == 0 and super().is_doubled(x)
+
+    def with_reference(self, x: Array) -> Self:
+        """Return the same: nothing needs a reference."""
+        return self
+
+    @functools.cached_property
+    def breaks(self) -> Array:
+        """Places on the unit interval where the forcing has jumps or corners that no free parameter moves: t = s T(p)."""
+        moved = self.parameters.copy()
+        moved[self._free] *= _OTHERWISE
+        here, there = (self.problem.batch("field").switches(*self.problem.domain, p) for p in (self.parameters, moved))
+        still = np.abs(here[:, None] - there) <= _STILL if there.size else np.zeros((here.size, 1), dtype=bool)
+        found: Array = here[still.any(axis=1)]
+        return found
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a torus bifurcation; None near a double multiplier -1."""
+        return None if is_opposite(frequency) else ("TR", "torus")
+
+
+class CycleEquations(Conditioned, PeriodicEquations):
+    """An autonomous `CycleProblem` on a mesh.
+
+    The phase condition, the integral of u . v' over that of v' . v', is linear: one row beside the collocation equations,
+
+        [ collocation   ]        the integral is taken at the Gauss points, with v' of the piecewise polynomial v, the reference
+        [ u(0) - u(1)   ]
+        [ phase row . x ]
+
+    An angle that rotates gains whole rounds, which u(0) - u(1) contains; the phase row is then applied to u - v.
+
+    Attributes
+    ----------
+    reference : ndarray, shape (K, n)
+        The states of v at the nodes, in the user's units; zero where `with_reference` has not set it.
+    """
+
+    def __init__(
+        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        self._set_reference(np.zeros((self.nodes.size, self._n)))
+
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
+        self.equations = self._conditions + 1
+        if PERIOD in self.free:
+            at = self.free.index(PERIOD)
+            known = self.parameters[self._free[at]] / self.free_scales[at]
+            self.weights[self.state_size + at] = _PERIOD_SHARE / (1 + known) ** 2
+        self._drifted: set[bytes] = set()
+
+    def _set_reference(self, reference: Array) -> None:
+        """Take the phase row from an orbit, states at the nodes."""
+        self.reference = reference
+        self._amplitude: Array | None = None
+        scaled = reference / self.scales.states
+        self._phase = self.phase_row(scaled)
+        self._target = float(self._phase[: self.state_size] @ scaled.ravel()) if self.rotates else 0.0
+
+    # --- the discrete equations ----------------------------------------------------------------------------------
+
+    def condition_values(self, x: Array) -> Array:
+        """Return the phase condition, shape (1,)."""
+        return np.array([self._phase @ x - self._target])
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array]:
+        """The row of the phase condition, and its value."""
+        return self._phase[None], np.array([self._target])
+
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return the phase condition and its row."""
+        return self.condition_values(x), self._phase[None]
+
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return zeros: the phase condition contains no parameter."""
+        return np.zeros((1, len(names)))
+
+    # --- stability -----------------------------------------------------------------------------------------------
+
+    @property
+    def start_direction(self) -> Array:
+        """The direction in which the reference leaves t = 0, scaled, shape (n,)."""
+        first = (self.reference[1] - self.reference[0]) / self.scales.states
+        return np.asarray(first / np.linalg.norm(first), dtype=float)
+
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers; where the one that is 1 has drifted, the flow's direction is split off.
+
+        After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
+        """
+        room, outcome = self._filled(x)
+        if outcome == DRIFTED:
+            self._drifted.add(x.tobytes())
+            flow, count = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d])), len(room.matrices)
+            values = log_eigenvalues_along(room.matrices, np.concatenate([flow[:count], flow[:1]]))
+            room.real[:], room.imaginary[:] = values.real, values.imag
+            fill_multipliers(room, 1)
+        return room.real + 1j * room.imaginary
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""
+        self.eigenvalues(x)
+        return x.tobytes() in self._drifted
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a torus bifurcation; None near a double multiplier -1.
+
+        None, too, where the pair may be a double multiplier 1 (at a fold): an error e of the one that is 1 splits it by
+        sqrt(e).
+        """
+        trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
+        return None if frequency**2 < _SPLIT * trivial or is_opposite(frequency) else ("TR", "torus")
+
+    def rates(self, x: Array, points: Array) -> Array:
+        """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
+        n, times = self._n, np.zeros(len(points))
+        rates: Array = self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
+        return rates
+
+    def has_shrunk(self, x: Array) -> bool:
+        """Return whether an orbit is an equilibrium, up to the square root of round-off."""
+        states = self._scaled_states(x)
+        return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
+    def amplitude(self, x: Array) -> float:
+        """Return the size of an orbit as a part of that of the reference; negative where the orbit is half a period later.
+
+        It is the product of both, without their means, over that of the reference with itself.
+        """
+        return float(self.amplitude_row @ x[: self.state_size])
+
+    @functools.cached_property
+    def _mean_turn(self) -> Array:
+        """The mean of the powers of the symmetry."""
+        found: Array = np.mean([np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)], axis=0)
+        return found
+
+    @property
+    def amplitude_row(self) -> Array:
+        """The row that takes the states in x to `amplitude`, shape (state_size,)."""
+        if self._amplitude is None:
+            weights = self.weights[: self.state_size : self._n]
+            group = self._mean_turn
+            reference = self.reference - group @ (weights @ self.reference)
+            row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
+            self._amplitude = (row * self.scales.states).ravel()
+        return self._amplitude
+
+    # --- meshes and references -----------------------------------------------------------------------------------
+
+    def _with(self, **changes: Any) -> CycleEquations:
+        other: Any = super()._with(**changes)
+        other._set_reference(self.reference)
+        found: CycleEquations = other
+        return found
+
+    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
+        """Return the same on another mesh, with the same reference, and the carrier."""
+        other, carry = super().on_mesh(mesh)
+        known = np.concatenate([(self.reference / self.scales.states).ravel(), np.zeros(len(self.free))])
+        other._set_reference(other.states(carry(known)))
+        return other, carry
+
+    def with_reference(self, x: Array) -> Self:
+        """Return the same with the orbit x as the reference.
+
+        Raises
+        ------
+        ProblemError
+            It is constant.
+        """
+        states = self.states(x)
+        if not np.ptp(states, axis=0).any():
+            raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
+        return self._referring_to(states)
+
+    def _referring_to(self, states: Array) -> Self:
+        """Return the same on the same mesh, with a reference given by its states at the nodes."""
+        other = self._copied()
+        other._set_reference(states)
+        return other
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+        """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
+        mesh, states = self._better_mesh(x, control), self.states(x)
+        if mesh is None and np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
+            return None
+        other = self._referring_to(states)
+        return (other, np.array) if mesh is None else other.on_mesh(mesh)
+
+
+def _turns(times: Array) -> Indices:
+    """Return how many parts lie between times and the unit interval, whose both ends belong to it."""
+    inside = not times.size or (times.min() >= 0 and times.max() <= 1)
+    return np.zeros(times.shape, dtype=int) if inside else np.floor(times).astype(int)
+
+
+def _gains(once: Array, symmetry: Array, order: int) -> Array:
+    """Return what angles have gained after 0, 1, ... parts with u(1) = S u(0) + once, shape (order + 1, n)."""
+    found = [np.zeros(once.size)]
+    for _ in range(order):
+        found.append(symmetry @ found[-1] + once)
+    return np.array(found)
+
+
+def is_opposite(frequency: float) -> bool:
+    """Return whether a multiplier with this angle is -1, up to round-off."""
+    return abs(frequency - math.pi) < _OPPOSITE
+
+
+def is_pair(values: ComplexArray) -> Mask:
+    """Return which logarithms belong to multipliers that are not real."""
+    found: Mask = (values.imag != 0) & (np.abs(values.imag) != math.pi)
+    return found

@@ -1,0 +1,321 @@
+"""Fixed points and cycles of maps, as the continuation sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray, Mask
+from contin.core.rounding import on_circle
+from contin.core.scales import Scales
+from contin.cycles.equations import is_opposite, is_pair
+from contin.equilibria.equations import AlgebraicEquations
+from contin.events.nearness import NO_MULTIPLIER
+from contin.functions.batch import Batch
+from contin.linalg.periodic import log_eigenvalues
+from contin.problems.angles import check_windings, gain, whole_rounds, windings
+from contin.problems.own_names import ROUNDS, rounds_of
+
+#: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
+_SHRUNK = 1e-7
+#: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
+#: unknowns take as long as sparse ones.
+_MANY = 200
+
+
+class MapEquations(AlgebraicEquations):
+    """Cycles u_1 ... u_k of a map: f(u_j, p) - u_(j+1) = 0, with u_(k+1) = u_1. There are no scales.
+
+    All points are unknowns, so that the equations are as nonlinear as f, and not as f applied k times: other cycles, which may
+    come as near to one point of a cycle as there are numbers, are apart in some of the others, and round-off of the residual is
+    that of f. The matrix is
+
+                             u_1    u_2    ...    u_k     p
+                          [  A_1    -1                   B_1  ]
+                          [         A_2    -1            B_2  ]        A_j, B_j: derivatives of f at u_j by u and p
+                          [               ...    -1      ...  ]
+                          [  -1                  A_k     B_k  ]
+
+    Angles gain whole rounds, u_(k+1) = u_1 + `gain`. Columns are those of u_1; the norm is the root mean square over the cycle.
+
+    Raises
+    ------
+    ProblemError
+        ``rounds`` is no whole number, or free.
+    """
+
+    problem: Any
+    gain: Array
+    #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds; none of them is always 1.
+    order, autonomous = 1, False
+
+    def __init__(
+        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None,
+        scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, free, parameters)
+        values = dict(zip(problem.parameters, map(float, self.parameters)))
+        self.rounds = rounds_of(self.free, values)
+        check_windings(problem.angles, self.free, values)
+        #: What the angles gain over the cycle, shape (n,).
+        self.gain = gain(problem.angles, problem.state_names, values)
+        self._n = len(problem.state_names)
+        self.state_size = self.equations = self._n * self.rounds
+        self.size = self.state_size + len(self.free)
+        self.weights = np.append(np.full(self.state_size, 1 / self.rounds), np.ones(len(self.free)))
+
+    @property
+    def nodes(self) -> Array:
+        """The number of each point of the cycle over that of all, shape (rounds,)."""
+        return np.arange(self.rounds) / self.rounds
+
+    @property
+    def is_sparse(self) -> bool:
+        """The matrix is kept sparse: the cycle is long, and few of the entries are not zero."""
+        return self.state_size >= _MANY and self.rounds >= _MANY // self._n
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether the multipliers are in doubt: they never are."""
+        return False
+
+    # --- states --------------------------------------------------------------------------------------------------
+
+    def states(self, x: Array) -> Array:
+        """Return the points of the cycle, shape (rounds, n)."""
+        return x[: self.state_size].reshape(self.rounds, self._n)
+
+    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
+        """Return a vector of unknowns from all points of a cycle, or from one of them, to which the map is applied."""
+        states = np.asarray(states, dtype=float).reshape(-1, self._n)
+        if len(states) == self.rounds:
+            return super().pack(states, values)
+        x = np.concatenate([np.tile(states[0], self.rounds), [float(values[name]) for name in self.free]])
+        with np.errstate(all="ignore"):
+            for at in range(1, self.rounds):
+                following = self._images(x, self.states(x)[at - 1 : at])
+                if not np.isfinite(following).all():
+                    break  # it runs away: the rest stays where it began
+                self.states(x)[at] = following
+        return x
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals at the first point, in their order."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        values: Array = self.problem.batch("functionals").values(*self._arguments(x, self.states(x)[:1]))[0]
+        return values
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super(AlgebraicEquations, self).column_gradient(x, name)
+        batch = self.problem.batch("functionals")
+        here = batch.jacobian(*self._arguments(x, self.states(x)[:1]), batch.columns(self._free))[1][0, names.index(name)]
+        gradient = np.zeros(self.size)
+        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
+        return gradient
+
+    # --- the equations -------------------------------------------------------------------------------------------
+
+    def _arguments(self, x: Array, states: Array) -> tuple[Array, Array, Array, Array]:
+        return np.zeros(len(states)), np.ascontiguousarray(states), np.empty((0, self._n)), self.all_parameters(x)
+
+    def _images(self, x: Array, states: Array) -> Array:
+        """Return f at states (K, n), shape (K, n)."""
+        images: Array = self.problem.batch("map").values(*self._arguments(x, states))
+        return images
+
+    def _missed(self, x: Array, images: Array) -> Array:
+        """Return f(u_j) - u_(j+1), shape (equations,), of the images f(u_j); the last one gains whole rounds of angles."""
+        gaps = images - np.roll(self.states(x), -1, axis=0)
+        gaps[-1] -= self.gain
+        return gaps.ravel()
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that those of the first point are nearest to those of a reference."""
+        if not self.circles.any():
+            return x
+        moved = x.copy()
+        self.states(moved)[0] += whole_rounds(self.states(reference)[0] - self.states(x)[0], self.circles)
+        moved = self.continuous(moved)
+        # y' = y + ..., x' = x + y' of a standard map: one round more of y changes what x gains, and is another cycle here
+        return x if whole_rounds(self.gained(moved) - self.gain, self.circles).any() else moved
+
+    def moved(self, x: Array, shift: int) -> Array:
+        """Return a cycle that begins with a later point."""
+        moved = x.copy()
+        states = self.states(x)
+        self.states(moved)[:] = np.concatenate([states[shift:], states[:shift] + self.gain])
+        return moved
+
+    def continuous(self, x: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that each point is nearest to the image of the one before."""
+        x = x.copy()
+        states = self.states(x)
+        for at in range(1, self.rounds):
+            states[at] += whole_rounds(self._images(x, states[at - 1 : at])[0] - states[at], self.circles)
+        return x
+
+    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[Self, Array]:
+        """Return the system with the winding numbers that x has, unless they are given, and a continuous x."""
+        if not self.circles.any():
+            return self, x
+        x = self.continuous(x)
+        read = windings(self.problem.angles, self.problem.state_names, self.gained(x))
+        other: Any = self.with_parameters({name: given.get(name, value) for name, value in read.items()})
+        return other, x
+
+    def gained(self, x: Array) -> Array:
+        """Return the image of the last point less the first one, shape (n,)."""
+        states = self.states(x)
+        return np.asarray(self._images(x, states[-1:])[0] - states[0])
+
+    def residual(self, x: Array) -> Array:
+        """Return f(u_j) - u_(j+1), shape (equations,)."""
+        return self._missed(x, self._images(x, self.states(x)))
+
+    def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
+        """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""
+        batch = self.problem.batch("map")
+        found: tuple[Array, Array] = batch.jacobian(*self._arguments(x, self.states(x)), batch.columns(self._indices(names)))
+        return found
+
+    def _jacobian(self, x: Array) -> tuple[Array, Any]:
+        """Return the residual and F_x, a sparse array where `is_sparse`."""
+        return self.differentiated(x, self.free)
+
+    def differentiated(self, x: Array, names: Sequence[str]) -> tuple[Array, Any]:
+        """Return the residual, and its derivatives by the states and by these parameters."""
+        n, k, size = self._n, self.rounds, self.state_size
+        values, jacobians = self._derivatives(x, names)
+        residual = self._missed(x, values)
+        at = np.arange(size).reshape(k, n)
+        following = np.roll(at, -1, axis=0)
+        if not self.is_sparse:
+            matrix = np.zeros((size, size + len(names)))
+            matrix[at[:, :, None], at[:, None, :]] = jacobians[:, :, :n]
+            matrix[at, following] -= 1.0
+            matrix[:, size:] = jacobians[:, :, n:].reshape(size, -1)
+            return residual, matrix
+        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only long cycles need it
+
+        rows = np.broadcast_to(at[:, :, None], jacobians.shape)
+        of_parameters = np.broadcast_to(size + np.arange(len(names)), (k, n, len(names)))
+        columns = np.concatenate([np.broadcast_to(at[:, None, :], (k, n, n)), of_parameters], axis=2)
+        entries = np.append(jacobians.ravel(), np.full(size, -1.0))
+        places = np.append(rows.ravel(), at.ravel()), np.append(columns.ravel(), following.ravel())
+        return residual, csr_array((entries, places), shape=(size, size + len(names)))
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        columns: Array = self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
+        return columns
+
+    def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several stacks of directions: f at every point; the rest is linear."""
+        n, count = self._n, len(directions[0])
+        wide = [np.zeros((count, self.rounds, n + len(self.parameters))) for _ in directions]
+        for inputs, stack in zip(wide, directions):
+            inputs[:, :, :n] = stack[:, : self.state_size].reshape(count, self.rounds, n)
+            inputs[:, :, n + self._free] = stack[:, None, self.state_size :] if stack.shape[1] > self.state_size else 0.0
+        given = self._arguments(x, np.tile(self.states(x), (count, 1)))
+        flat = [inputs.reshape(count * self.rounds, -1) for inputs in wide]
+        found: Array = self.problem.batch("map").along(*given, flat).reshape(count, -1)
+        if len(directions) == 1:
+            found = found - np.roll(directions[0][:, : self.state_size], -n, axis=1)
+        return found
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        batch = self.problem.batch("map")
+        given = *self._arguments(x, self.states(x)), w.reshape(self.rounds, self._n), self._wide(v, self.states(v))
+        found = batch.bent(*given, batch.columns(self._free))
+        return np.append(found[:, : self._n].ravel(), found[:, self._n :].sum(axis=0))
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super(AlgebraicEquations, self).column_bent(x, name, v)
+        batch, weights = self.problem.batch("functionals"), np.zeros((1, len(names)))
+        weights[0, names.index(name)] = 1.0
+        given = *self._arguments(x, self.states(x)[:1]), weights, self._wide(v, self.states(v)[:1])
+        here = batch.bent(*given, batch.columns(self._free))[0]
+        gradient = np.zeros(self.size)
+        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
+        return gradient
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The map."""
+        return (self.problem.batch("map"),)
+
+    def transitions(self, x: Array) -> Array:
+        """Return the derivatives of f by the states at all points, shape (rounds, n, n)."""
+        return self._derivatives(x, ())[1]
+
+    def jacobian(self, x: Array) -> Array:
+        """Return F_u, shape (equations, equations)."""
+        matrix = self.differentiated(x, ())[1]
+        found: Array = matrix.toarray() if self.is_sparse else matrix
+        return found
+
+    # --- stability -----------------------------------------------------------------------------------------------
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers, shape (n,): those with a positive real part are unstable.
+
+        That of a pair on the unit circle, to round-off, has the real part zero.
+        """
+        return self._eigenvalues(x)[0]
+
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the logarithms of the multipliers at several places."""
+        return [self.eigenvalues(x) for x in places]
+
+    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the logarithms, and as computed."""
+        values = self._logarithms(x)
+        return np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values), values
+
+    def neutral(self, x: Array) -> Mask:
+        """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""
+        return on_circle(self._logarithms, x, self.computed_eigenvalues(x))
+
+    def _logarithms(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
+        values = log_eigenvalues(self.transitions(x))
+        values.real = np.maximum(values.real, np.log(NO_MULTIPLIER))
+        return values
+
+    def is_symmetric(self, x: Array) -> bool:
+        """Return False: F_u couples the points of a cycle."""
+        return False
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a torus bifurcation; None near a double multiplier -1."""
+        return None if is_opposite(frequency) else ("TR", "torus")
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its rounds, up to the square root of round-off."""
+        if self.rounds % 2:
+            return False
+        first, second = np.split(self.states(x), 2)
+        apart = second - first
+        apart = apart - whole_rounds(apart, self.circles)
+        return bool(np.all(np.abs(apart) <= _SHRUNK * (1 + np.abs(first))))
+
+    def doubled(self, x: Array) -> tuple[Self, Array]:
+        """Return the same problem with twice the rounds, and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other: Any = self.with_parameters({ROUNDS: 2.0 * self.rounds})
+        states = self.states(x)
+        found: tuple[Self, Array] = other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
+        return found
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapEquations, Array]:
+        """Return the same."""
+        return self, x

@@ -1,0 +1,388 @@
+"""F(u, p) = 0 through the same loop: the statement, and the system that the continuation works on."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.collocation.mesh import MeshControl
+from contin.core.protocol import Carrier, Discretization
+from contin.core.rounding import may_be_on_axis, off_axis
+from contin.core.scales import Scales, usual
+from contin.core.system import System
+from contin.equilibria.given import check_given
+from contin.functions.batch import Batch, Columns
+from contin.linalg.dense import DenseFactors, eigenvalues
+from contin.linalg.factors import Factors
+from contin.linalg.rightmost import nearest, rightmost
+from contin.linalg.sparse import SparseFactors
+from contin.problems.angles import whole_rounds
+
+
+class AlgebraicEquations(System):
+    """F(u, p) = 0 with chosen free parameters: the equations of an `Algebraic`."""
+
+    intervals = 0
+    degree = 0
+    problem: Any
+    #: What angles of a map gain over a cycle.
+    gain: Array | None = None
+
+    def __init__(
+        self,
+        problem: Any,
+        free: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        scales: Scales | None = None,
+    ) -> None:
+        super().__init__(problem, free, parameters or {}, scales)
+        self.state_size = len(problem.state_names)
+        self.size = self.state_size + len(self.free)
+        self.equations = problem.equation_size
+        self.weights = np.ones(self.size)
+        self._found: dict[bytes, tuple[ComplexArray, ComplexArray]] = {}
+        self._none = np.empty((0, self.state_size))  # the absent second state of functions of one point
+
+    @property
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """The residual's."""
+        return (("residual", self.problem.equation_size),)
+
+    @property
+    def nodes(self) -> Array:
+        """One place, shape (1,)."""
+        return _NO_TIME
+
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        found: tuple[str, ...] = self.problem.state_names
+        return found
+
+    def states(self, x: Array) -> Array:
+        """Return the states, shape (1, n)."""
+        states = x[: self.state_size].reshape(1, -1)
+        return states * self.scales.states
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that they are nearest to those of a reference."""
+        if not self.circles.any():
+            return x
+        apart = (reference - x)[: self.state_size].reshape(-1, self.circles.size)
+        moved = x.copy()
+        moved[: self.state_size] += whole_rounds(apart, self.circles).ravel()
+        return moved
+
+    def residual(self, x: Array) -> Array:
+        """Return F at x, shape (equations,)."""
+        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
+        values: Array = self._residual.values(_NO_TIME, u, self._none, p)[0]
+        return values
+
+    @functools.cached_property
+    def _residual(self) -> Any:
+        """The residual, compiled."""
+        return self._batch("residual", ("residual",))
+
+    @functools.cached_property
+    def _by_unknowns(self) -> Columns:
+        """Columns of the residual's derivatives by the unknowns."""
+        found: Columns = self._residual.columns(self._free)
+        return found
+
+    @functools.cached_property
+    def _by_states(self) -> tuple[Batch, Columns]:
+        """The residual in the user's units, and columns of its derivatives by the states."""
+        batch = self.problem.batch("residual")
+        return batch, batch.columns([])
+
+    @functools.cached_property
+    def is_sparse(self) -> bool:
+        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse
+        one."""
+        if self.problem.jacobian is not None:
+            return self.state_size >= _MANY and self.problem.gives_sparse_matrix
+        entries = self._by_unknowns.rows.size
+        return self.state_size >= _MANY and entries <= _FEW * self.size * self.equations
+
+    def _jacobian(self, x: Array) -> tuple[Array, Any]:
+        """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
+        given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
+        if self.problem.jacobian is not None:
+            check_given(self.problem, self.states(x)[0], self.all_parameters(x))
+            return self._given_jacobian(x, given)
+        columns = self._by_unknowns
+        if not self.is_sparse:
+            values, jacobian = self._residual.jacobian(*given, columns)
+            return values[0], jacobian[0]
+        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
+
+        residual, entries = self._residual.entries(*given, columns)
+        return residual, csr_array((entries, (columns.rows, columns.places)), shape=(self.equations, self.size))
+
+    def _given_jacobian(self, x: Array, given: Any) -> tuple[Array, Any]:
+        """Return the same with the derivatives by states from the user's function."""
+        values, by_parameters = self._residual.jacobian(*given, self._residual.columns(self._free, ()))
+        matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))
+        rows, columns = 1 / self.scales.rows["residual"], self.scales.states
+        matrix = matrix * columns * rows[:, None] if not self.is_sparse else matrix.multiply(columns).multiply(rows[:, None])
+        if not self.is_sparse:
+            return values[0], np.hstack([matrix, by_parameters[0]])
+        from scipy.sparse import csr_array, hstack
+
+        return values[0], hstack([csr_array(matrix), csr_array(by_parameters[0])]).tocsr()
+
+    def _own_jacobian(self, u: Array, p: Array) -> Any:
+        """Return the user's Jacobian; dense unless `is_sparse`."""
+        matrix = self.problem.jacobian_at(u, p)
+        return matrix if self.is_sparse else _dense(matrix)
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        residual, jacobian = self._jacobian(x)
+        if not self.is_sparse:
+            matrix = np.zeros((self.equations + len(rows), self.size + len(columns)))
+            matrix[: self.equations, : self.size] = jacobian
+            for number, column in enumerate(columns):
+                matrix[: self.equations, self.size + number] = column
+            for number, row in enumerate(rows):
+                matrix[self.equations + number] = row
+            return residual, DenseFactors(matrix)
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        from scipy.sparse import csr_array, hstack, vstack
+
+        beside = hstack([jacobian, csr_array(columns.T)]) if len(columns) else jacobian
+        return residual, SparseFactors(vstack([beside, csr_array(rows)]) if len(rows) else beside, len(rows))
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        which = self._indices(names)
+        u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
+        batch = self._residual
+        if self.problem.jacobian is not None:
+            found: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(which, ()))[1][0]
+            return found
+        columns_of = batch.columns(which)
+        if self.is_sparse:
+            rows, places = columns_of.rows, columns_of.places
+            entries = batch.entries(_NO_TIME, u, self._none, p, columns_of)[1]
+            columns = np.zeros((self.equations, len(which)))
+            columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
+            return columns
+        dense: Array = batch.jacobian(_NO_TIME, u, self._none, p, columns_of)[1][0, :, n:]
+        return dense
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+        product: Array = self._jacobian(x)[1].T @ w
+        return product
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,)."""
+        found: Array = self.stack_along(x, [v[None] for v in directions])[0]
+        return found
+
+    def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return it along several stacks of directions, shape (K, size) each or, of states alone, (K, n); (K, equations)."""
+        n, count = self.state_size, len(directions[0])
+        u, p = np.repeat(x[:n].reshape(1, -1), count, axis=0), self._scaled_parameters(x)
+        wide = [np.zeros((count, n + p.size)) for _ in directions]
+        for inputs, stack in zip(wide, directions):
+            inputs[:, :n] = stack[:, :n]
+            inputs[:, n + self._free] = stack[:, n:] if stack.shape[1] > n else 0.0
+        found: Array = self._residual.along(np.zeros(count), u, self._none, p, wide)
+        return found
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        if self.problem.batch("residual").interpreted is not None:
+            return super().bent(x, w, v)  # two Jacobians instead of one value for each entry
+        u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
+        wide = self._wide(v, v[None, :n])
+        found: Array = batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]
+        return found
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The residual; in the user's units, too."""
+        return self._residual, self.problem.batch("residual")
+
+    def jacobian(self, x: Array) -> Array:
+        """Return F_u in the user's units, shape (equations, n)."""
+        jacobian: Array = self.jacobians(x, self.states(x))[0]
+        return jacobian
+
+    def jacobians(self, x: Array, states: Array) -> Array:
+        """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
+        p = self.all_parameters(x)
+        if self.problem.jacobian is not None:
+            return np.array([_dense(self.problem.jacobian_at(u, p)) for u in states])
+        batch, columns = self._by_states
+        times = _NO_TIME if len(states) == 1 else np.zeros(len(states))
+        return batch.jacobian(times, states, self._none, p, columns)[1]
+
+    def field_jacobian(self, x: Array) -> Array:
+        """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
+        jacobian: Array = self._jacobian(x)[1][:, : self.state_size]
+        return jacobian
+
+    def as_field(self) -> AlgebraicEquations:
+        """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
+        if self.scales.are_one:
+            return self
+        return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the eigenvalues of F_u, complex: the stability of the equilibrium of u' = F.
+
+        All n of them or, of a matrix that is kept sparse, those right of the imaginary axis or near to it.
+        """
+        return self._eigenvalues(x)[0]
+
+    def computed_eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the eigenvalues with their round-off, where a zero of a real part is located."""
+        return self._eigenvalues(x)[1]
+
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the eigenvalues at several places; those of small matrices are computed together."""
+        new = [x for x in places if x.tobytes() not in self._found]
+        matrices = np.array([] if self.is_sparse else [self.jacobian(x) for x in new])
+        if len(matrices) and np.isfinite(matrices).all():
+            found = eigenvalues(matrices)
+            near = may_be_on_axis(found).any()
+            for x, matrix, values in zip(new, matrices, found):
+                self._keep(x.tobytes(), (off_axis(eigenvalues, matrix, values) if near else values, values))
+        return [self.eigenvalues(x) for x in places]
+
+    def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
+        if len(self._found) > _KEPT:
+            del self._found[next(iter(self._found))]
+        self._found[key] = found
+
+    def _eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
+        key = x.tobytes()
+        if key not in self._found:
+            self._keep(key, self._all_eigenvalues(x))
+        return self._found[key]
+
+    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the eigenvalues, those of pairs on the axis up to round-off with the real part 0, and as computed."""
+        if self.is_sparse:
+            found = rightmost(self.as_field().field_jacobian(x))
+            return found, found
+        matrix = self.jacobian(x)
+        found = eigenvalues(matrix)
+        return off_axis(eigenvalues, matrix, found), found
+
+    def is_symmetric(self, x: Array) -> bool:
+        """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
+        if not self.is_sparse:
+            return False
+        matrix: Any = self.as_field().field_jacobian(x)
+        return bool(abs(matrix - matrix.T).max() <= _SYMMETRIC * abs(matrix).max())
+
+    def eigenvalue_near(self, x: Array, value: complex) -> complex:
+        """Return the eigenvalue of F_u that is nearest to a value; NaN where none is found."""
+        if self.is_sparse:
+            return nearest(self.as_field().field_jacobian(x), value)
+        values = self.eigenvalues(x)
+        return complex(values[np.argmin(np.abs(values - value))])
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
+        return "HB", "Hopf"
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals, in their order."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        batch = self.problem.batch("functionals")
+        values: Array = batch.values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
+        return values
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super().column_gradient(x, name)
+        batch = self._batch("functionals")
+        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
+        gradient: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(self._free))[1][0, names.index(name)]
+        return gradient
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super().column_bent(x, name, v)
+        batch, n = self._batch("functionals"), self.state_size
+        weights = np.zeros((1, len(names)))
+        weights[0, names.index(name)] = 1.0
+        given = _NO_TIME, x[:n].reshape(1, -1), self._none, self._scaled_parameters(x)
+        found: Array = batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
+        return found
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[AlgebraicEquations, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
+        z = self.carrier(scaled)(x)
+        jacobian = abs(scaled._jacobian(z)[1])
+        largest = jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
+        rows = usual(largest)
+        return self._with(scales=Scales(states, parameters, {"residual": rows})), z
+
+    def without_scales(self, x: Array) -> tuple[AlgebraicEquations, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
+
+    def _with(self, **changes: Any) -> AlgebraicEquations:
+        """Return the same with other free parameters, parameters or scales."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        kept = {"free": self.free, "parameters": values, "scales": self.scales}
+        return type(self)(self.problem, **{**kept, **changes})
+
+    def carrier(self, other: Discretization) -> Carrier:
+        """Return the function that carries vectors of unknowns to another system of this problem."""
+        return self._between_scales(np.array, other)
+
+    def refined(self) -> None:
+        """Return None: there is no mesh."""
+
+    def adapted(self, x: Array, control: MeshControl) -> None:
+        """Return None: there is no mesh."""
+
+    def with_parameters(self, values: Mapping[str, float]) -> AlgebraicEquations:
+        """Return the same problem with other values of parameters that are not free."""
+        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[AlgebraicEquations, Array]:
+        """Return the same problem with other free parameters (values from x), and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = self._with(free=free, parameters=values)
+        return other, other.pack(self.states(x), values)
+
+
+#: Smallest number of states for which a sparse matrix is considered. Below, a dense factorization takes no longer.
+_MANY = 200
+#: Largest part of its entries that may differ from zero.
+_FEW = 0.1
+#: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
+_KEPT = 64
+#: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
+_SYMMETRIC = 1e-13
+#: The t of functions that do not take it.
+_NO_TIME = np.zeros(1)
+
+
+def _dense(matrix: Any) -> Array:
+    """Return a matrix that a user gives, which may be sparse, as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())
