@@ -61,9 +61,11 @@ class BranchPointSearch:
         """How many branch points the step passes, and whether that is clear."""
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         row, size = state.row, state.system.size
+        if before.sign == trial.sign and state.system.cannot_branch(self.arc):
+            return 0, True
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and (state.system.cannot_branch(self.arc) or calm(before.factors, trial.factors, size)):
+        if before.sign == trial.sign and calm(before.factors, trial.factors, size):
             return 0, True
         watched = is_watched(before.factors, trial.factors, size)
         if watched and not self.sign_changes:
