@@ -180,6 +180,10 @@ class Discretization(Equations, Protocol):
         return None
 
     # --- what a kind of problem knows of its branches; the answers here are those of a kind that knows nothing -----------
+    #
+    # Records that are made of systems cannot be named here: an ``arc`` is a `contin.events.arc.Arc`, a ``point`` the
+    # `SpecialPoint` of that file (of `defining` also a `contin.Point`), a ``trial`` a `contin.core.trial.Trial`; events are
+    # `contin.Event`.
 
     @property
     def solution(self) -> Discretization:
@@ -240,7 +244,7 @@ class Discretization(Equations, Protocol):
         return None
 
     def events(self) -> list[Any]:
-        """Return the test functions that the kind brings, beyond folds and branch points.
+        """Return the events that the kind brings, beyond folds and branch points.
 
         Their signs may differ between meshes. They ask ``trial.system``: the mesh changes along a branch.
         """
@@ -248,7 +252,7 @@ class Discretization(Equations, Protocol):
 
     @property
     def index(self) -> Any:
-        """The test function whose value is the index of a point, of a problem with an energy."""
+        """The event whose value is the index of a point, of a problem with an energy; None for others."""
         return None
 
     def stability(self, point: Any) -> Any:
@@ -257,16 +261,16 @@ class Discretization(Equations, Protocol):
 
     @property
     def size_of_solutions(self) -> Any:
-        """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""
+        """The event of the size of a solution, with a sign, where solutions can shrink onto others; else None."""
         return None
 
     @property
     def small_equations(self) -> Any:
-        """The functions of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
+        """The `Batch` of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
         return None
 
     def home(self, arc: Any) -> Any:
-        """Return the end of the branch inside a step, where solutions become those of another kind."""
+        """Return the end of the branch inside a step, where solutions become those of another kind, or None."""
         return None
 
     def collapsed(self, x: Array, z: Array) -> bool:
@@ -286,15 +290,15 @@ class Discretization(Equations, Protocol):
         return point
 
     def coefficient(self, point: Any) -> Any:
-        """Return the coefficient of the normal form at a special point."""
+        """Return the `Coefficient` of the normal form at a special point; None where there is none."""
         return None
 
     def events_on_folds(self) -> list[Any]:
-        """Return the test functions of a curve of folds, beyond cusps and branch points."""
+        """Return the events of a curve of folds, beyond cusps and branch points."""
         return []
 
     def events_on_curves(self) -> list[Any]:
-        """Return the test functions of a curve along which one of `events` stays zero."""
+        """Return the events of a curve along which one of `events` stays zero."""
         return []
 
     def judged_on_curve(self, point: Any, solution: Any) -> Any:
@@ -302,11 +306,11 @@ class Discretization(Equations, Protocol):
         return point
 
     def standstill(self, trial: Any, primary: str) -> Any:
-        """Return the reason to end a run whose primary parameter has not moved; None to go on."""
+        """Return the `contin.Stop` of a run whose primary parameter has not moved; None to go on."""
         return None
 
     def explained(self, stop: Any, trial: Any) -> Any:
-        """Return the reason why a run ends, with what the kind knows of its last point."""
+        """Return the `contin.Stop` of a run, with what the kind knows of its last point."""
         return stop
 
     def lasting(self, x: Array) -> Array:
