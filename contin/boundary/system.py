@@ -487,10 +487,10 @@ class Collocation(System):
         kept = {"free": self.free, "parameters": values, "scales": self.scales}
         return type(self)(self.problem, self.mesh, self.degree, **{**kept, **changes})
 
-    def _copied(self) -> Self:
-        """Return a copy with all that was computed, which ``copy.copy`` leaves out."""
+    def _copied(self, without: Sequence[str] = ()) -> Self:
+        """Return a copy with all that was computed, which ``copy.copy`` leaves out, but for what is to change."""
         other = object.__new__(type(self))
-        vars(other).update(vars(self))
+        vars(other).update({name: value for name, value in vars(self).items() if name not in without})
         return other
 
     def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:

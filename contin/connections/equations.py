@@ -19,6 +19,8 @@ from contin.errors import ConvergenceError
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 
+#: What is computed when it is first asked for, and depends on the reference.
+_OF_A_REFERENCE = ("_known_subspaces", "_complements")
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
 #: Number of places whose subspaces are kept: a step asks for those of a few iterates.
@@ -72,8 +74,7 @@ class ConnectionEquations(Conditioned):
 
     def with_reference(self, x: Array) -> Self:
         """Return the same with v and Q of the orbit x."""
-        other = self._copied()
-        other._known_subspaces = {}
+        other = self._copied(without=_OF_A_REFERENCE)
         other.reference = np.array(x)
         other._phase = other.phase_row(other._scaled_states(x))
         other._target = float(other._phase @ x)

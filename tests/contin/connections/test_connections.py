@@ -199,3 +199,20 @@ def test_what_cannot_be_is_said():
     )  # fmt: skip
     with pytest.raises(ProblemError, match="a source, no saddle"):
         homoclinic(cycle, free=["mu"])
+
+
+def test_an_orbit_that_was_used_takes_another_reference():
+    """Whatever was computed before: the equations are those of a system that was made with that reference."""
+    point = front()
+    x, y = point.x, point.x.copy()
+    y[point.system.state_size :] *= 1.05  # another saddle, with other subspaces
+    used, values = point.system.with_reference(x), dict(zip(point.system.problem.parameters, point.system.all_parameters(x)))
+    used.linearize(x)
+    used.along(x, [x, x])
+    given = point.system.free, values, point.system.scales, point.system.mesh, point.system.degree
+    made = point.system.problem.discretized(*given).with_reference(y)
+    (values, factors), (known, others) = used.with_reference(y).linearize(y), made.linearize(y)
+    assert np.array_equal(values, known)
+    right = np.ones(len(y))
+    assert np.array_equal(factors.solve(right), others.solve(right))
+    assert np.array_equal(used.with_reference(y).along(y, [x, x]), made.along(y, [x, x]))
