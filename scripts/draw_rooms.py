@@ -149,7 +149,7 @@ def _draw_box(axes: Any, corner: Place, room: str, packages: list[str]) -> None:
     fill = FILLS[room == FOUNDATION]
     axes.add_patch(FancyBboxPatch((x, y), WIDTH, HEIGHT, "round,pad=0,rounding_size=.07", fc=fill, ec=LINE, zorder=3))
     axes.text(x + 0.12, y + 0.335, room, size=11, weight="bold", color=TEXT, **style)
-    axes.text(x + 0.12, y + 0.135, PURPOSE[room], size=8.4, color=FAINT, **style)
+    axes.text(x + 0.12, y + 0.135, PURPOSE.get(room, ""), size=8.4, color=FAINT, **style)
     if packages:
         text = f"imports {', '.join(packages)}"
         axes.text(x + WIDTH - 0.12, y + 0.335, text, size=8.4, color=FAINT, ha="right", fontstyle="italic", **style)

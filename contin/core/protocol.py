@@ -205,6 +205,11 @@ class Discretization(Equations, Protocol):
         return self.solution is not self
 
     @property
+    def starts_cycles(self) -> bool:
+        """Whether cycles of `CycleProblem` or `MapProblem` begin where a pair, or a multiplier, becomes critical."""
+        return False
+
+    @property
     def is_cycle(self) -> bool:
         """Whether solutions are periodic orbits, of vector fields or maps."""
         return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -136,6 +136,10 @@ class System(Discretization):
         """Return the largest absolute value of each state, and that of each free parameter, of a vector like x."""
         states = np.abs(v[: self.state_size]).reshape(-1, len(self.problem.states)).max(axis=0, initial=0.0)
         return np.append(states, np.abs(v[self.state_size :]))
+
+    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[Self, Array]:
+        """Return the same with the rounds that angles make in x, unless they are given, and a continuous x."""
+        return self, x
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.

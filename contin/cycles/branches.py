@@ -25,6 +25,11 @@ class OfCycles(Discretization):
     of_tori: Any
 
     @property
+    def starts_cycles(self) -> bool:
+        """Yes: of twice the length."""
+        return True
+
+    @property
     def is_cycle(self) -> bool:
         """Yes."""
         return True

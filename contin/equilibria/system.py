@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -53,9 +53,10 @@ class Algebraic(AlgebraicEquations):
         known: Batch = self._residual
         return known if type(self) is Algebraic and self.problem.jacobian is None else None
 
-    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[Self, Array]:
-        """Return the same, and x for it: there are no rounds."""
-        return self, x
+    @property
+    def starts_cycles(self) -> bool:
+        """Where the states move in time."""
+        return bool(self.problem.dynamics)
 
     @property
     def stored(self) -> dict[str, Array]:

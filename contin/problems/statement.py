@@ -71,6 +71,8 @@ class Restated:
     symmetries: Mapping[str, Any] = {}
     #: Into how many equal parts a symmetry divides solutions.
     order = 1
+    #: The states move in time: solutions are equilibria.
+    dynamics = False
     #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
     spare: str | None = None
     #: Of problems that are put together from segments: their parts.
@@ -203,6 +205,13 @@ def forget_changed(problem: Any) -> bool:
     for name in changed:
         del batches[name]
     return bool(changed)
+
+
+def declared(problem: Any, name: str) -> Any:
+    """Return what a statement says of itself or, where it says nothing, what `Restated` says for all: it need not be one."""
+    if name == "dimension":
+        return getattr(problem, name, len(problem.states))
+    return getattr(problem, name, getattr(Restated, name))
 
 
 def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]:

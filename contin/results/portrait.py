@@ -13,6 +13,7 @@ from contin.boundary.system import Collocation
 from contin.cycles.floquet import floquet
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
+from contin.problems.statement import declared
 from contin.results.axes import new_axes
 
 #: Places at which a solution is drawn, for each interval of its mesh, and at least.
@@ -75,7 +76,7 @@ def _chosen(system: Collocation, states: Sequence[str] | None) -> tuple[str, ...
 def _known(system: Collocation) -> tuple[str, ...]:
     """Return the names of the states; of segments each name once, in order."""
     problem = system.problem
-    if not problem.pieces:
+    if not declared(problem, "pieces"):
         return tuple(problem.state_names)
     return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
 
@@ -83,7 +84,7 @@ def _known(system: Collocation) -> tuple[str, ...]:
 def _courses(point: Any, names: Sequence[str]) -> list[tuple[Array, Array]]:
     """Return times in the user's units (K,) and states (K, n) of each segment; a state that it does not have is NaN."""
     problem = point.system.problem
-    if not problem.pieces:
+    if not declared(problem, "pieces"):
         return [_course(point, names)]
     found = []
     for index in range(len(problem.pieces)):

@@ -9,6 +9,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.problems.statement import declared
 
 
 class Profile:
@@ -26,7 +27,7 @@ class Profile:
 
     def __init__(self, point: Any, index: int) -> None:
         problem = point.system.problem
-        if not problem.pieces:
+        if not declared(problem, "pieces"):
             raise ProblemError("segment: the problem has no segments; state it as a SegmentedProblem")
         checks.whole("segment", index, 0, len(problem.pieces) - 1)
         self._point, self._at = point, problem.pieces[index].at

@@ -27,6 +27,7 @@ from contin.events.branch_point import BranchPoint
 from contin.events.labelled import finding_of
 from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
+from contin.problems.statement import declared
 from contin.results.branch import Branch
 from contin.results.point import Point
 
@@ -92,7 +93,7 @@ def save(branch: Branch, path: str | Path) -> None:
 
 def _symmetry(problem: Any) -> list[list[float]] | None:
     """Return the matrix of the symmetry of cycles; None where none is declared."""
-    return problem.symmetry.tolist() if problem.order > 1 else None
+    return problem.symmetry.tolist() if declared(problem, "order") > 1 else None
 
 
 def _row(point: Point, at: int) -> dict[str, Any]:

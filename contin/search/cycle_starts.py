@@ -34,7 +34,7 @@ _INTERVALS = 20
 
 def switches(point: Point) -> bool:
     """Return whether a branch of another kind begins at a point."""
-    return point.label == "HB" or doubles(point)
+    return point.system.starts_cycles and (point.label == "HB" or doubles(point))
 
 
 def switched(
@@ -71,7 +71,7 @@ def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Ar
         It is no Hopf point of equilibria.
     """
     system: Any = point.system
-    if point.label != "HB" or system.intervals or system.on_curve:
+    if point.label != "HB" or system.is_cycle or not system.starts_cycles:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
     cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, intervals)

@@ -22,6 +22,7 @@ from contin.events.labelled import finding_of
 from contin.functions.signature import argument_count
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
+from contin.problems.statement import declared
 from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
@@ -268,7 +269,7 @@ class _Explorer:
         if known.system.named_states and point.system.size_of_solutions is not None:
             states = known.system.states(known.x).ravel()
             ours |= {f"max_{name}": value for name, value in zip(known.system.problem.states, states)}
-        angles = known.system.problem.angles
+        angles = declared(known.system.problem, "angles")
         names = [name for name in ours if name in theirs and name != ROUNDS and name not in winding_names(angles)]
         factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
         for name in names:
@@ -332,7 +333,7 @@ class _Explorer:
 def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
     """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
     states = system.states(x).copy()
-    visible = states[:, : system.problem.dimension]
+    visible = states[:, : declared(system.problem, "dimension")]
     visible[:] = symmetry(system.nodes, visible.copy())
     return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
 
@@ -340,7 +341,7 @@ def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
 def _seen(system: Any, x: Array) -> Array:
     """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
     problem = system.problem
-    if problem.dimension == len(problem.states):
+    if declared(problem, "dimension") == len(problem.states):
         return x
     x = x.copy()
     x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
@@ -395,20 +396,20 @@ def diagram(
         if argument_count(checks.function("symmetries", symmetry)) != 2:
             raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
     settings = settings_with(settings, options)
-    symmetries = [*symmetries, *system_of(start, "start").problem.symmetries.values()]
+    symmetries = [*symmetries, *declared(system_of(start, "start").problem, "symmetries").values()]
     system, x = (
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )
-    _check_columns(system.problem, settings)
+    _check_columns(system, settings)
     return _Explorer(settings, symmetries, tolerance, Progress(progress)).run(system, x, depth)
 
 
-def _check_columns(problem: Any, settings: Settings) -> None:
+def _check_columns(system: Any, settings: Settings) -> None:
     """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
+    problem = system.problem
     known = [*problem.parameters, *problem.functionals]
-    if problem.domain is None:
-        known += problem.state_names
-    if problem.domain is None and problem.dynamics:
+    known += [name for name in system.named_states if name not in known]
+    if system.starts_cycles and not system.is_cycle:
         cycles = CycleProblem.of(problem)
         known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
     for name in (*settings.limits, *settings.zeros):

@@ -20,6 +20,7 @@ from contin.errors import ProblemError
 from contin.linalg.orientation import first_least
 from contin.problems.angles import periods_of, whole_rounds, winding_names, windings
 from contin.problems.own_names import PERIOD, TIME
+from contin.problems.statement import declared
 from contin.results.point import Point
 from contin.search.grown_orbit import grown_orbit
 from contin.search.solving import solved
@@ -82,7 +83,7 @@ def homoclinic(
     checks.instance("start", start, Point, "a Point")
     control = MeshControl() if mesh is None else mesh
     system: Any = start.system
-    if not system.on_curve and not system.intervals and system.problem.dynamics:
+    if not system.on_curve and not system.intervals and declared(system.problem, "dynamics"):
         return _from_saddle(start, free, limits, direction, (control, newton))
     if limits is not None and system.size_of_solutions is not None:
         raise ProblemError("limits: are for a start at an equilibrium; the orbit is looked for near the cycle")
