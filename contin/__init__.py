@@ -28,8 +28,9 @@ _MOVED, _RENAMED = ("lowlevel", "auto07p"), {"Monitor": "Event", "TestFunction":
 
 def __getattr__(name: str) -> Any:
     """Return a public name, imported when it is first used."""
-    if name == "Monitor":  # the first name of the class
-        name = "Event"
+    if name in _RENAMED:
+        warnings.warn(f"contin.{name} is contin.{_RENAMED[name]} now", DeprecationWarning, stacklevel=2)
+        return _public(_RENAMED[name])
     try:
         return _public(name)
     except AttributeError:

@@ -7,6 +7,6 @@ Examples
 ['AutoBranch', 'AutoSolution', 'from_auto', 'read_auto']
 """
 
-import lazy_loader
+from contin.lowlevel import names_of
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("contin", __file__)
+__getattr__, __dir__, __all__ = names_of(__name__, __file__)

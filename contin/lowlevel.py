@@ -11,6 +11,27 @@ Examples
 2.0
 """
 
+import sys
+from collections.abc import Callable
+from typing import Any
+
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("contin", __file__)
+
+def names_of(module: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a module of names, which its stub lists.
+
+    lazy_loader keeps what it has found in the package; here it is kept in the module.
+    """
+    find, listed, names = lazy_loader.attach_stub("contin", file)
+
+    def found(name: str) -> Any:
+        value = find(name)
+        vars(sys.modules["contin"]).pop(name, None)
+        setattr(sys.modules[module], name, value)
+        return value
+
+    return found, listed, names
+
+
+__getattr__, __dir__, __all__ = names_of(__name__, __file__)

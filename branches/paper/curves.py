@@ -87,7 +87,7 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
 def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, float]]]:
     """Where the branch that breaks all but one mirror leaves (m, n): (nu, kappa_n), shape (K, 2); its labelled points."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
-    settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, monitors=Watch(RIBBON, system, x).monitors)
+    settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, events=Watch(RIBBON, system, x).monitors)
     first = next(point for point in follow(system, x, settings, tangent) if point.label == LABEL)
     system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)

@@ -107,7 +107,7 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
 
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
     monitors = Watch(law, system, x).monitors if label == "SB" else ()
-    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, monitors=monitors), tangent)
+    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors), tangent)
     point = branch.labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
     kappa_n = _past(point["kappa_n"], side)

@@ -632,6 +632,11 @@ class Collocation(System):
         return found
 
     @property
+    def is_function_of_t(self) -> bool:
+        """Yes."""
+        return True
+
+    @property
     def stored(self) -> dict[str, Array]:
         """Mesh, parameters and sizes."""
         return {"mesh": self.mesh, **self._own_arrays}

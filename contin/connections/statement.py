@@ -125,6 +125,9 @@ class ConnectionProblem(BoundaryValueProblem):
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
         return ConnectionCollocation(self, mesh, degree, free, parameters, scales)
 
+    def _groups(self) -> list[str]:
+        return ["field", "boundary"]
+
     @property
     def multipliers(self) -> tuple[str, ...]:
         """Names of the parameters that are free on every curve: the coordinates of the equilibria."""

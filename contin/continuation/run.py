@@ -100,7 +100,7 @@ class Continuation:
         self._limits = limits(settings.limits)
         general = [
             *user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema),
-            *settings.wanted,
+            *settings.events,
         ]  # fmt: skip
         self._tests = [*general, *self._own]
         self._meshes = MeshPolicy(self._steps, general)

@@ -205,6 +205,11 @@ class Discretization(Equations, Protocol):
         return self.solution is not self
 
     @property
+    def is_function_of_t(self) -> bool:
+        """Whether a solution is a function of t that `evaluate` gives: it can be drawn, and be a guess of another one."""
+        return False
+
+    @property
     def starts_cycles(self) -> bool:
         """Whether cycles of `CycleProblem` or `MapProblem` begin where a pair, or a multiplier, becomes critical."""
         return False

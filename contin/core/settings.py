@@ -95,12 +95,10 @@ class Settings:
     extrema: Sequence[str] = ()
     events: Sequence[Event] = ()
 
-    @property
-    def wanted(self) -> Sequence[Event]:
-        """The events that were asked for, by whichever name."""
-        return (*self.monitors, *self.test_functions, *self.events)
-
     def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in (*_FIRST_NAMES, "events")}
+        for name, value in {**dict.fromkeys(_FIRST_NAMES, ()), **_by_new_name(given, stacklevel=5)}.items():
+            object.__setattr__(self, name, value)
         self._check_kinds()
         self._check_numbers()
         self._check_columns()
@@ -112,11 +110,8 @@ class Settings:
         for name in ("folds", "branch_points", "errors"):
             checks.truth(name, getattr(self, name))
         checks.names("extrema", self.extrema)
-        for name in ("events", "test_functions", "monitors"):
-            for test in checks.sequence(name, getattr(self, name), "Event"):
-                checks.instance(name, test, Event, "an Event")
-            if name != "events" and getattr(self, name):
-                warnings.warn(f"{name}= is called events= now", DeprecationWarning, stacklevel=5)
+        for test in checks.sequence("events", self.events, "Event"):
+            checks.instance("events", test, Event, "an Event")
         checks.instance("newton", self.newton, Newton, "a Newton")
         checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
 
@@ -204,7 +199,8 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
         An unknown field, or a value that it cannot have.
     """
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
-    known = [entry.name for entry in dataclasses.fields(Settings)]
+    known = [entry.name for entry in dataclasses.fields(Settings) if entry.name not in _FIRST_NAMES]
+    options = _by_new_name(options, stacklevel=4)
     for name in options:
         if name not in known:
             raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
@@ -212,3 +208,20 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
     if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
         options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}
     return dataclasses.replace(settings, **options)
+
+
+#: First names of the field ``events``, which stay for one version.
+_FIRST_NAMES = ("monitors", "test_functions")
+
+
+def _by_new_name(options: Mapping[str, Any], stacklevel: int) -> dict[str, Any]:
+    """Return fields with the events that were given by their first names, and warn where the caller gave these."""
+    found = dict(options)
+    for name in _FIRST_NAMES:
+        given = checks.sequence(name, found.pop(name, ()), "Event")
+        for event in given:
+            checks.instance(name, event, Event, "an Event")
+        if given:
+            warnings.warn(f"{name}= is called events= now", DeprecationWarning, stacklevel=stacklevel)
+            found["events"] = (*given, *checks.sequence("events", found.get("events", ()), "Event"))
+    return found

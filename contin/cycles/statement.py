@@ -168,6 +168,9 @@ class CycleProblem(BoundaryValueProblem):
         kind = CycleCollocation if self.period is None else ForcedCollocation
         return kind(self, mesh, degree, free, parameters, scales)
 
+    def _groups(self) -> list[str]:
+        return ["field", "boundary", *(["functionals"] if self.means else [])]
+
     def usual_degree(self, tolerance: float) -> int:
         """Return the degree of a mesh where none is given.
 

@@ -223,7 +223,7 @@ class Point:
         >>> len(axes.lines)
         2
         """
-        return portrait.plot(self, what, states, axes)
+        return portrait.plot(underlying(self), what, states, axes)
 
     def segment(self, index: int) -> Profile:
         """Return the solution on one segment of a `SegmentedProblem`, over its own coordinate; segments count from 0.
@@ -246,7 +246,7 @@ class Point:
         >>> round(float(point.segment(1)(1.0)[0, 0]), 9)
         0.25
         """
-        return Profile(self, index)
+        return Profile(underlying(self), index)
 
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.

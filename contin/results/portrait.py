@@ -29,7 +29,7 @@ _MOST_RINGS = 6
 def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
     """Draw one point; see `contin.Point.plot`."""
     system = point.system
-    if not system.intervals:
+    if not system.is_function_of_t:
         raise ProblemError("plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem")
     drawings = _drawings(system)
     if what is not None and what not in drawings:

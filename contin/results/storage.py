@@ -85,7 +85,9 @@ def save(branch: Branch, path: str | Path) -> None:
         "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
         "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),
         "symmetry": _symmetry(first.solution.problem), "notes": list(branch.notes),
-    } | ({"curves": curves, "further": further} if curves else {})  # fmt: skip
+    }  # fmt: skip
+    if curves:
+        head |= {"curves": curves, "further": further, "symmetric": head["symmetry"] is not None}
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
     write_whole(path, image.getvalue())
@@ -165,7 +167,8 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
         if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
             raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
-        if head.get("symmetry") != _symmetry(problem):
+        told = "symmetric" in head or not head.get("curves")  # version 0.2 did not tell it of curves
+        if told and head.get("symmetry") != _symmetry(problem):
             raise ProblemError(f"{str(path)!r} is of a problem with the symmetry {head.get('symmetry')}")
         systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]

@@ -18,6 +18,9 @@ from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
 from contin.search.solving import solve
 
+#: A motion that is further off, relative to 1 + where it began, goes to infinity: towards a pole steps of the integrator shrink
+#: without end. Ten times larger, it takes a step or two more.
+_FAR = 1e12
 #: Tolerances of the integration while the motion settles, and of the round that is the guess. With 1e-9 for both it takes twice
 #: as long.
 _SETTLES, _ACCURATE = 1e-6, 1e-9
@@ -104,8 +107,14 @@ def _vector_field(problem: CycleProblem, values: Any) -> Any:
 def _integrated(field: Any, start: Array, time: float, tolerance: float, **options: Any) -> Any:
     from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # .3 s; only this needs it
 
-    done = solve_ivp(field, (0.0, time), start, method="LSODA", rtol=tolerance, atol=tolerance, **options)
-    if not done.success or not np.isfinite(done.y).all():
+    far = _FAR * (1 + np.abs(start).max(initial=0.0))
+
+    def escapes(_: float, u: Array) -> float:
+        return float(far - np.abs(u).max(initial=0.0))
+
+    escapes.terminal = True  # type: ignore[attr-defined]  # as SciPy takes it
+    done = solve_ivp(field, (0.0, time), start, method="LSODA", rtol=tolerance, atol=tolerance, events=escapes, **options)
+    if done.status or not np.isfinite(done.y).all():
         raise ProblemError(f"start: the motion from there has no finite value after t = {done.t[-1]:.6g}")
     return done
 

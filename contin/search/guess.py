@@ -151,7 +151,7 @@ def _numbers(values: Any, count: int | None = None) -> Array:
 def _meshed(guess: Point) -> Collocation:
     """Return the system of a guess that is a solution of a boundary value problem."""
     system: Any = guess.system
-    if not system.intervals:
+    if not system.is_function_of_t:
         raise ProblemError("guess: a Point must be a solution of a boundary value problem")
     found: Collocation = system
     return found

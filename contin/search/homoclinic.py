@@ -135,6 +135,9 @@ def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, N
     ProblemError
     """
     system: Any = cycle.system
+    names = checks.names("free", free)
+    if len(names) != 1 or names[0] not in system.problem.parameters or names[0] == PERIOD:
+        raise ProblemError(f"free: {', '.join(names) or 'none'} must be one parameter, in which the orbit is looked for")
     if system.size_of_solutions is None:
         raise ProblemError("start: must be a point of a CycleProblem, or an equilibrium of an AlgebraicProblem")
     if system.order > 1:

@@ -15,6 +15,9 @@ from contin.errors import ProblemError
 from contin.events.bordered import BorderedMatrix
 from contin.events.hopf import critical_real_part
 from contin.events.labelled import frequency_of
+from contin.problems.angles import winding_names
+from contin.problems.own_names import ROUNDS
+from contin.problems.statement import declared
 from contin.results.point import Point, system_of
 
 
@@ -57,7 +60,8 @@ def sensitivities(
     checks.instance("point", point, Point, "a Point")
     system = system_of(point, "point")
     others = [name for name in system.problem.parameters if name not in system.free]
-    by = others if by is None else list(checks.names("by", by))
+    whole = (ROUNDS, *winding_names(declared(system.problem, "angles")))  # numbers of rounds, which cannot change a little
+    by = [name for name in others if name not in whole] if by is None else list(checks.names("by", by))
     for name in by:
         if name not in others:
             raise ProblemError(f"by: {name!r} must be one of the parameters that are not free ({', '.join(others)})")

@@ -91,7 +91,7 @@ def solve(
 
 def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
     """Return the degree where none is given."""
-    if isinstance(guess, Point):
+    if isinstance(guess, Point) and guess.system.is_function_of_t:
         return guess.system.degree
     return problem.usual_degree(control.tolerance)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -14,7 +15,7 @@ from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.system import System
-from contin.core.trial import Event
+from contin.core.trial import Event, Trial
 from contin.defining.branch_point_curve import BranchPointCurve
 from contin.defining.event_curve import EventCurve
 from contin.defining.extended import Extended
@@ -211,8 +212,17 @@ def _value(start: Point, base: Any, x: Array) -> _First:
     column, value = start.column, start.value
     assert value is not None
     known = base.column_gradient(x, column) is not None
-    gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
-    return EventCurve(base, lambda trial: trial[column] - value, gradient), x
+    return EventCurve(base, partial(_off, column, value), partial(_slope, column) if known else None), x
+
+
+def _off(column: str, value: float, trial: Trial) -> float:
+    """Return by how much a column is off a value."""
+    return trial[column] - value
+
+
+def _slope(column: str, system: Any, x: Array) -> Array:
+    found: Array = system.column_gradient(x, column)
+    return found
 
 
 def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
@@ -244,7 +254,7 @@ _LOCATED = 1e-6
 _STARTS = (
     "one of LP, BP, HB (of equilibria), PD, TR, EX, a special point of homoclinic orbits, or one where a column has a value "
     "(UZ, EP); "
-    "for one of your own test functions, give it as event"
+    "for one of your own events, give it as event"
 )
 _KINDS = (_branch_points, _folds, _of_the_kind, _extrema, _values)
 _KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)

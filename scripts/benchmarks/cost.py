@@ -145,7 +145,7 @@ def _reference(m, n, truth):
         limits={"kappa_n": (-2e4, 2e3)}, errors=False, branch_points=False, trivial="M2", max_points=5000
     )
     there = contin.Event("UZ", "there", lambda trial: trial["kappa_n"] - truth.kappa_n)
-    settings = contin.Settings(**{**vars(settings), "test_functions": (there,)})
+    settings = contin.Settings(**{**vars(settings), "events": (there,)})
     for point in contin.lowlevel.Continuation(system, x, settings, tangent):
         if point.label == "UZ" and abs(point["kappa_star"] - truth.kappa_star) < 1e-4 * (1 + abs(truth.kappa_star)):
             return point.system, point.x

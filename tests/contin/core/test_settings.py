@@ -16,7 +16,7 @@ from contin.core.settings import settings_with
         ({"limits": {"lam": (2, 1)}}, "limits: lam: \\(2, 1\\) must be two numbers, the first the smaller"),
         ({"angle": 3.0}, "angle: 3.0 must be a number between 0 and 1.5"),
         ({"folds": 1}, "folds: 1 must be True or False"),
-        ({"test_functions": [max]}, "test_functions: .* must be an Event"),
+        ({"events": [max]}, "events: .* must be an Event"),
     ],
 )
 def test_a_value_that_is_not_allowed_is_refused_with_the_range(settings, said):

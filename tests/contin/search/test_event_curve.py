@@ -131,7 +131,7 @@ def test_a_user_zero_of_a_curve_in_three_parameters():
 
 def test_wrong_events():
     start = next(point for point in branch() if point.name == "hot")
-    with pytest.raises(ProblemError, match="for one of your own test functions, give it as event"):
+    with pytest.raises(ProblemError, match="for one of your own events, give it as event"):
         curve(start, "eps")
     with pytest.raises(ProblemError, match="event: 'cold' is 1 at the start; it must be the function that labelled it"):
         curve(start, "eps", event=Event("UZ", "cold", lambda trial: middle(trial) + 1.0))
