@@ -48,11 +48,12 @@ def test_pieces_of_the_diagram_carry_the_index(branch):
 
 
 def test_the_same_points_without_and_no_column(branch, tmp_path):
+    """Another step would move all later points by a part of a step; round-off in the lengths moves them by 5e-12."""
     run_branch(parse(SCENE.replace("stability: true, ", ""), "scene"), tmp_path / "x.h5", Display(silent=True))
     plain = read_branch(tmp_path / "x.h5")
     assert "index" not in plain.points.dtype.names
     regular = branch.points[branch.points["label"] != b"SB"]
-    assert regular["kappa_n"] == pytest.approx(plain.points["kappa_n"], rel=1e-12)
+    assert regular["kappa_n"] == pytest.approx(plain.points["kappa_n"], rel=1e-6)
 
 
 def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
