@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
+#: Names of modules of the package begin with this.
+_PACKAGE = __name__.partition(".")[0] + "."
+
 
 class ContinError(Exception):
     """Base of all errors raised on purpose.
@@ -48,3 +54,11 @@ class ConvergenceError(ContinError, ArithmeticError):
     ...     print("there is no solution near by")
     there is no solution near by
     """
+
+
+def warn(text: str, category: type[Warning]) -> None:
+    """Warn at the line outside the package from which it was called, however deep inside it this is."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, category, stacklevel=level)

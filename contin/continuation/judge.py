@@ -35,7 +35,8 @@ class Judge:
         fold: Event | None, sense: Callable[[Trial], float],
     ) -> None:  # fmt: skip
         self._start, self._tests, self._general, self._fold, self._sense = start, tests, general, fold, sense
-        self._ends = [test for test in tests if test.terminal and not test.limit]
+        #: The test functions at whose zeros the run ends, but for limits.
+        self.ends = [test for test in tests if test.terminal and not test.limit]
         self.index = start[0].index
         self._watch = watch_list(start[0], settings, tests, fold, self.index)
 
@@ -66,12 +67,7 @@ class Judge:
         The equations may not hold there, and no mesh be fine enough.
         """
         before, trial = arc.before, arc.trial
-        return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
-
-    @property
-    def ends(self) -> Sequence[Event]:
-        """The test functions at whose zeros the run ends, but for limits."""
-        return self._ends
+        return any(test.passed(before.value(test), trial.value(test)) for test in self.ends)
 
     def _contradiction(self, inspection: Inspection) -> str:
         """Return how the change of index over a step contradicts its special points; "" if not."""

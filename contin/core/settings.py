@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypedDict
@@ -13,7 +12,7 @@ from contin.collocation.mesh import MeshControl
 from contin.core.newton import Newton
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
-from contin.errors import ProblemError
+from contin.errors import ProblemError, warn
 from contin.names import exact_text
 
 
@@ -97,7 +96,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in (*_FIRST_NAMES, "events")}
-        for name, value in {**dict.fromkeys(_FIRST_NAMES, ()), **_by_new_name(given, stacklevel=5)}.items():
+        for name, value in {**dict.fromkeys(_FIRST_NAMES, ()), **_by_new_name(given)}.items():
             object.__setattr__(self, name, value)
         self._check_kinds()
         self._check_numbers()
@@ -200,7 +199,7 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
     """
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
     known = [entry.name for entry in dataclasses.fields(Settings) if entry.name not in _FIRST_NAMES]
-    options = _by_new_name(options, stacklevel=4)
+    options = _by_new_name(options)
     for name in options:
         if name not in known:
             raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
@@ -214,7 +213,7 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
 _FIRST_NAMES = ("monitors", "test_functions")
 
 
-def _by_new_name(options: Mapping[str, Any], stacklevel: int) -> dict[str, Any]:
+def _by_new_name(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return fields with the events that were given by their first names, and warn where the caller gave these."""
     found = dict(options)
     for name in _FIRST_NAMES:
@@ -222,6 +221,6 @@ def _by_new_name(options: Mapping[str, Any], stacklevel: int) -> dict[str, Any]:
         for event in given:
             checks.instance(name, event, Event, "an Event")
         if given:
-            warnings.warn(f"{name}= is called events= now", DeprecationWarning, stacklevel=stacklevel)
+            warn(f"{name}= is called events= now", DeprecationWarning)
             found["events"] = (*given, *checks.sequence("events", found.get("events", ()), "Event"))
     return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import warnings
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from contin import checks
 from contin.arrays import Array, Function, Places
 from contin.core.scales import Scales
 from contin.equilibria.system import Algebraic
-from contin.errors import ProblemError
+from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
@@ -88,8 +87,8 @@ class AlgebraicProblem(Restated):
         if self.jacobian is not None and argument_count(checks.function("jacobian", self.jacobian)) != 2:
             raise ProblemError("jacobian must take 2 arguments, (u, p)")
         if self.pattern is not None:
-            warnings.warn("pattern= has no effect any more, and will go: entries are found by recording, or give jacobian=",
-                          DeprecationWarning, stacklevel=3)  # fmt: skip
+            what = "pattern= has no effect any more, and will go: entries are found by recording, or give jacobian="
+            warn(what, DeprecationWarning)
         if self.dynamics and self.equation_size != len(self.state_names):
             self._keep(dynamics=False)
         self._keep(angles=angle_periods(self.angles, self.state_names))

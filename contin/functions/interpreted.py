@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import sys
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -17,12 +16,10 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array, Function, Indices
-from contin.errors import InterpretedWarning, ProblemError
+from contin.errors import InterpretedWarning, ProblemError, warn
 from contin.functions import round_off
 from contin.functions.signature import Signature, named_values
 
-#: What names of this package's modules begin with.
-_PACKAGE = __name__.partition(".")[0] + "."
 #: First length of differences, relative to the size of an input, of first and of higher derivatives, which are differences of
 #: differences. Errors of fourth order and of round-off are below 1e-11, or 1e-8, where a function changes over such a size.
 _DIFFERENCE, _NESTED = 2e-4, 2e-3
@@ -130,7 +127,7 @@ class Interpreted:
         names = " and ".join(self._name(index) for index in range(len(self._functions)))
         how = f"differences (an estimated error of {self.error:.0e})"
         text = f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
-        warnings.warn(text, InterpretedWarning, stacklevel=_users_level())
+        warn(text, InterpretedWarning)
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
@@ -279,14 +276,6 @@ class Interpreted:
         result = np.zeros(shape, dtype=np.asarray(x).dtype)
         function(*arguments, result)
         return result
-
-
-def _users_level() -> int:
-    """Return the number of calls from here up to code outside the package."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(_PACKAGE):
-        frame, level = frame.f_back, level + 1
-    return level
 
 
 def _beside(x: Array) -> Array:

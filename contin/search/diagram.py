@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Unpack
 
@@ -305,29 +305,25 @@ class _Explorer:
         parameters = slice(a.state_size, None)
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
-        for symmetry in self.symmetries:
-            image, (turned,) = a.in_phase(_image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
-            gap = image - there
-            if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
-                continue
-            cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
-            which = int(np.argmax(np.abs(cosines)))
-            return which, int(np.sign(cosines[which]) or 1)
-        return None
+        return next(self._carried_onto(known, here, ahead), None)
 
     def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
         """Return (tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
-        system, result = point.system, []
-        here, direction = _seen(system, point.x), _seen(system, direction)
+        system = point.system
+        return list(self._carried_onto(point, _seen(system, point.x), _seen(system, direction)))
+
+    def _carried_onto(self, known: Point, x: Array, direction: Array) -> Iterator[tuple[int, int]]:
+        """Yield (tangent, way) of a junction for each symmetry that carries x onto it, and ``direction`` along that tangent."""
+        system = known.system
+        there = _seen(system, known.x)
         for symmetry in self.symmetries:
-            image, (turned,) = system.in_phase(_image(system, symmetry, here), (_image(system, symmetry, direction),), here)
-            gap = image - here
-            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
+            image, (turned,) = system.in_phase(_image(system, symmetry, x), (_image(system, symmetry, direction),), there)
+            gap = image - there
+            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, there, there))):
                 continue
-            cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
+            cosines = [inner(system, turned, tangent) for tangent in known.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
-            result.append((which, int(np.sign(cosines[which]) or 1)))
-        return result
+            yield which, int(np.sign(cosines[which]) or 1)
 
 
 def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:

@@ -31,7 +31,7 @@ def test_events_by_a_first_name(name):
     for call in (lambda: contin.Settings(**{name: [HALF]}), lambda: contin.trace(start, **DOWN, **{name: [HALF]})):
         with pytest.warns(DeprecationWarning, match=f"{name}= is called events= now") as told:
             found = call()
-        assert [warning.filename for warning in told] == [__file__]
+        assert [(warning.filename, warning.lineno) for warning in told] == [(__file__, call.__code__.co_firstlineno)]
         if isinstance(found, contin.Settings):
             assert found.events == (HALF,)
         else:

@@ -1,14 +1,13 @@
 """Curves along which a function keeps its value, through labelled points of branches and of curves in two parameters."""
 
 import functools
-import math
 
 import numpy as np
 import pytest
+from bank.gelfand import perturbed_gelfand
 
 from contin import (
     AlgebraicProblem,
-    BoundaryValueProblem,
     Event,
     ProblemError,
     curve,
@@ -18,14 +17,6 @@ from contin import (
     solve,
     trace,
 )
-
-
-@functools.cache
-def perturbed_gelfand():
-    return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.lam * math.exp(u.u / (1 + p.eps * u.u))), lambda a, b, p: (a.u, b.u), ["u", "v"],
-        {"lam": 0.0, "eps": 0.2}, functionals={"mean": lambda t, u, p: u.u},
-    )  # fmt: skip
 
 
 def middle(trial):

@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from bank import opt
 from bank.closed_forms import cusp, elastica
+from bank.gelfand import perturbed_gelfand
 
 from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, sensitivities, solve, trace
-
-
-@functools.cache
-def perturbed_gelfand():
-    """u'' + lam exp(u / (1 + eps u)) = 0, u(0) = u(1) = 0."""
-    return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.lam * math.exp(u.u / (1 + p.eps * u.u))), lambda a, b, p: (a.u, b.u), ["u", "v"],
-        {"lam": 0.0, "eps": 0.2}, functionals={"mean": lambda t, u, p: u.u},
-    )  # fmt: skip
 
 
 def gelfand_branch(eps=0.2, highest=30.0, **options):
