@@ -6,8 +6,8 @@ import contextlib
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from contin import ContinError, Point, Reason, Settings, Stop
-from contin.lowlevel import Continuation, State, exact_text
+from contin import ContinError, Point, Reason, Settings
+from contin.lowlevel import Continuation, State, Stop, exact_text
 
 #: Points that a run must find with a changed field before that change is advised. With 1, changes were advised that help for
 #: one step only; with 100, a failed run takes as long again as a stage.

@@ -9,8 +9,8 @@ import numpy as np
 
 from branches.advice import no_state
 from branches.config import Config
-from contin import Point, Reason, Stop
-from contin.lowlevel import Continuation
+from contin import Point, Reason
+from contin.lowlevel import Continuation, Stop
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds

@@ -16,8 +16,8 @@ from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Reason, Stop
-from contin.lowlevel import Continuation, exact_text
+from contin import Reason
+from contin.lowlevel import Continuation, Stop, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 

@@ -25,8 +25,8 @@ from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.open_errors import errors_of
 from branches.store import BranchWriter, Kind, read_kept, read_state
-from contin import Branch, ContinError, ConvergenceError, MeshControl, Point, ProblemError, Reason, Settings, Stop, load, save
-from contin.lowlevel import Collocation, Continuation, exact_text, point_of  # fmt: skip
+from contin import Branch, ContinError, ConvergenceError, MeshControl, Point, ProblemError, Reason, Settings, load, save
+from contin.lowlevel import Collocation, Continuation, Stop, exact_text, point_of  # fmt: skip
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip

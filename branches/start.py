@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 from branches.config import Config, ConfigError
-from contin import ContinError, ConvergenceError, MeshControl, Newton, Settings, Stop
-from contin.lowlevel import Continuation
+from contin import ContinError, ConvergenceError, MeshControl, Newton, Settings
+from contin.lowlevel import Continuation, Stop
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.secondary import force, secondary_branch

@@ -21,8 +21,8 @@ import numpy as np
 
 from branches.files import StoreError, write_bytes
 from branches.layout import CLOSED, FORMAT, FORMAT_VERSION, check, damage_told, vector
-from contin import Point, Stop
-from contin.lowlevel import Collocation, State
+from contin import Point
+from contin.lowlevel import Collocation, State, Stop
 
 #: HDF5's format since version 1.10, which has checksums.
 _LIBRARY = "v110"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.progress import Progress
-from contin import Settings
-from contin.lowlevel import follow
+from contin import Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model import convexity, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
@@ -132,7 +132,7 @@ def at_natural_curvatures(
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
-    for point in follow(system, x, settings, tangent):
+    for point in trace(point_of(system, x), settings, tangent=tangent):
         if point.label == "LP" and folds is not None:
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))
         if point.label == "UZ":

@@ -12,31 +12,32 @@ The tutorial is docs/contin.md; docs/architecture.md says which folder does what
 """
 
 import importlib
-import warnings
+import operator
+import sys
 from typing import Any
 
 import lazy_loader
+
+from contin.errors import warn
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
 __version__ = "0.2.0"
 
 _public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-#: Modules to which names have moved that were here in version 0.2, and new names of classes; the old ones stay here for one
-#: version, with a warning.
-_MOVED, _RENAMED = ("lowlevel", "auto07p"), {"Monitor": "Event", "TestFunction": "Event"}
+#: Modules to which names have moved that were here in version 0.2, and new names of others; the old ones stay for one version,
+#: with a warning.
+_MOVED = ("lowlevel", "auto07p")
+_RENAMED = {"Monitor": "Event", "TestFunction": "Event", "sensitivities": "Point.sensitivities"}
 
 
 def __getattr__(name: str) -> Any:
     """Return a public name, imported when it is first used."""
-    if name in _RENAMED:
-        warnings.warn(f"contin.{name} is contin.{_RENAMED[name]} now", DeprecationWarning, stacklevel=2)
-        return _public(_RENAMED[name])
     try:
         return _public(name)
     except AttributeError:
-        for module in _MOVED:
-            place = importlib.import_module(f"contin.{module}")
-            if name in place.__all__:
-                warnings.warn(f"contin.{name} is contin.{module}.{name} now", DeprecationWarning, stacklevel=2)
-                return getattr(place, name)
-        raise
+        moved = (f"{module}.{name}" for module in _MOVED if name in importlib.import_module(f"contin.{module}").__all__)
+        place = _RENAMED.get(name) or next(moved, None)
+        if place is None:
+            raise
+    warn(f"contin.{name} is contin.{place} now", DeprecationWarning)
+    return operator.attrgetter(place)(sys.modules[__name__])

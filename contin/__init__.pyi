@@ -7,21 +7,18 @@ from .collocation.mesh import MeshControl
 from .connections.statement import ConnectionProblem
 from .core.newton import Newton
 from .core.settings import Settings
-from .core.state import Reason, Stop
+from .core.state import Reason
 from .core.trial import Event
 from .cycles.map_statement import MapProblem
 from .cycles.statement import CycleProblem
 from .equilibria.statement import AlgebraicProblem
 from .errors import ContinError, ConvergenceError, ProblemError
-from .functions.gradient import gradient
-from .functions.iteration import least, minimum, root
 from .results.branch import Branch
 from .results.point import Point
 from .results.storage import load, save
 from .search.cycle import cycle
 from .search.diagram import Diagram, diagram
 from .search.homoclinic import homoclinic
-from .search.sensitivity import sensitivities
 from .search.solving import solve
 from .search.trace import trace
 from .search.two_parameter import curve
@@ -31,7 +28,7 @@ __version__: str
 __all__ = [
     "auto07p", "lowlevel",
     "AlgebraicProblem", "BoundaryValueProblem", "Branch", "ConnectionProblem", "ContinError", "ConvergenceError",
-    "CycleProblem", "Diagram", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Segment",
-    "SegmentedProblem", "Settings", "Stop", "Event", "VariationalProblem", "curve", "cycle", "diagram",
-    "gradient", "homoclinic", "least", "load", "minimum", "root", "save", "sensitivities", "solve", "trace",
+    "CycleProblem", "Diagram", "Event", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Segment",
+    "SegmentedProblem", "Settings", "VariationalProblem", "curve", "cycle", "diagram", "homoclinic", "load", "save", "solve",
+    "trace",
 ]  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.names import exact_text
 
@@ -113,4 +114,15 @@ def chosen(what: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
             raise ProblemError(f"{what}: {shown(name)} must be one of {listed(known) or 'none, as there are none here'}")
         if found.count(name) > 1:
             raise ProblemError(f"{what}: {plain(name)} is given twice")
+    return found
+
+
+def array(what: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """Require finite numbers of a shape, and return them as an array."""
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"{what}: {shown(value)} must be numbers") from None
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ProblemError(f"{what}: {shown(value)} must be {' x '.join(map(str, shape))} finite numbers")
     return found

@@ -1,10 +1,9 @@
 # The names of `contin.lowlevel`, and where they come from.
 from .boundary.system import Collocation
 from .collocation.basis import basis, interpolation
-from .continuation.progress import follow
 from .continuation.run import Continuation
 from .core.newton import correct
-from .core.state import State
+from .core.state import State, Stop
 from .core.trial import Trial
 from .equilibria.system import Algebraic
 from .events.branch_point import BranchPoint, locate_branch_point
@@ -12,13 +11,16 @@ from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
+from .functions.gradient import gradient
+from .functions.iteration import least, minimum, root
 from .linalg.orientation import eigenbasis
 from .names import exact_text
 from .results.columns import StoredColumns, read_columns
 from .results.point import point_of
+from .search.trace import follow
 
 __all__ = [
-    "Algebraic", "Batch", "BranchPoint", "Collocation", "Continuation", "MultiplePoint", "State", "StoredColumns",
-    "Trial", "basis", "cache_directory", "correct", "eigenbasis", "exact_text", "follow", "interpolation",
-    "locate_branch_point", "point_of", "read_columns", "temporary_name", "write_whole",
+    "Algebraic", "Batch", "BranchPoint", "Collocation", "Continuation", "MultiplePoint", "State", "Stop", "StoredColumns",
+    "Trial", "basis", "cache_directory", "correct", "eigenbasis", "exact_text", "follow", "gradient", "interpolation", "least",
+    "locate_branch_point", "minimum", "point_of", "read_columns", "root", "temporary_name", "write_whole",
 ]  # fmt: skip

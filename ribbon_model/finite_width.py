@@ -146,8 +146,7 @@ def energy(w1, w3, kappa_n, nu, Gamma):
 @functools.cache
 def _derivatives(function: Callable[..., float]):
     """Return U and its slopes, to be evaluated for many sections, and the columns of their derivatives."""
-    from contin import gradient
-    from contin.lowlevel import Batch  # loads compiled code, which circles do not need
+    from contin.lowlevel import Batch, gradient  # loads compiled code, which circles do not need
 
     def value(w1, w3, kappa_n, nu, plane, twist, stiff, C):
         return function(w1, w3, kappa_n, Section(nu, plane, twist, stiff, C))
@@ -218,7 +217,7 @@ def convex_limits(nu, width) -> list[float]:
 @functools.cache
 def _membrane_slopes():
     """Return the functions (g, g') and (g', g'')."""
-    from contin import gradient
+    from contin.lowlevel import gradient
 
     first = gradient(membrane, ("z",))
     return first, gradient(lambda z: first(z)[1], ("z",))
@@ -267,7 +266,7 @@ def complementary(M1, M3, kappa_n, section: Section, narrow=False):
     """
     import numpy as np
 
-    from contin import least  # loads compiled code, which circles do not need
+    from contin.lowlevel import least  # loads compiled code, which circles do not need
 
     nu, plane, _, _, C = section
     w1, w3, wide = start(M1, M3, kappa_n, section, narrow)
@@ -285,7 +284,7 @@ def ribbon_complementary(M1, M3, kappa_n, section: Section):
     """Return the same of a ribbon, with omega_1 > 0 where there is such a minimum."""
     import numpy as np
 
-    from contin import least
+    from contin.lowlevel import least
 
     w1, w3, known = ribbon_strains(M1, M3, kappa_n, section)
     side = np.where(known, 1.0, -1.0)

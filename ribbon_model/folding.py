@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import Settings
-from contin.lowlevel import Collocation, follow
+from contin import Settings, trace
+from contin.lowlevel import Collocation, point_of
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
 from ribbon_model.laws import Law
@@ -63,7 +63,7 @@ def folding(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = N
     system = Collocation(problem, np.linspace(0, 1, _INTERVALS + 1), _DEGREE, _FREE, values)
     start = HALF_LOOP_BETWEEN_AXES.circle(system, m, kappa_n, law.circle(m, kappa_n, nu, Gamma)["M1"])
     settings = Settings(primary="M2", limits={"M2": (-_LARGEST, _LARGEST)}, zeros={"M2": [0.0]}, max_points=_MOST, errors=False)
-    points = follow(system, start, settings).points
+    points = trace(point_of(system, start), settings).points
     ends = [i for i, point in enumerate(points) if point.label == "UZ" and i]
     if not ends:
         return None

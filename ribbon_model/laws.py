@@ -44,7 +44,7 @@ class Law:
     ----------
     name : str
     hamiltonian : callable
-        H(M1, M2, M3, kappa_n, *parameters), of numbers: arithmetic, ``math``, decisions, `contin.least`.
+        H(M1, M2, M3, kappa_n, *parameters), of numbers: arithmetic, ``math``, decisions, `contin.lowlevel.least`.
     constrained : bool
         True if omega_2 = 0 (then H does not depend on M2, which is a reaction).
     parameters : tuple of str
@@ -99,7 +99,7 @@ class Law:
     @functools.cached_property
     def response(self) -> Callable[..., tuple]:
         """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), of numbers."""
-        from contin import gradient  # loads compiled code (.3 s), which a law without its derivatives does not need
+        from contin.lowlevel import gradient  # loads compiled code (.3 s), which a law without its derivatives does not need
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 
@@ -217,8 +217,7 @@ def _response_at_points(law: Law):
 @functools.cache
 def _energy_at_points(law: Law):
     """Return U and its slopes by the strains and kappa_n in the same manner."""
-    from contin import gradient
-    from contin.lowlevel import Batch
+    from contin.lowlevel import Batch, gradient
 
     if law.energy is None:
         raise ValueError(f"law {law.name!r} has no strain energy for descents")

@@ -42,7 +42,7 @@ class Solution(Shown):
     >>> from ribbon_model.laws import RIBBON
     >>> from ribbon_model.seeds import primary_branch
     >>> system, x, tangent = primary_branch(RIBBON, 1, 2, nu=0.3, intervals=10, degree=7)
-    >>> point = contin.lowlevel.follow(system, x, contin.Settings(max_points=4), tangent).points[-1]
+    >>> point = contin.trace(contin.lowlevel.point_of(system, x), contin.Settings(max_points=4), tangent=tangent).points[-1]
     >>> solution = Solution.of(point)
     >>> solution.domain, solution.shape().closure() < 1e-9, solution.index().index
     (<cell>, True, 0)

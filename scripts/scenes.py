@@ -36,7 +36,8 @@ from pydantic import ValidationError  # noqa: E402
 from branches.config import Config, ConfigError  # noqa: E402
 from branches.ends import checked, is_threshold  # noqa: E402
 from branches.job import begun  # noqa: E402
-from contin import ConvergenceError, Point, Stop  # noqa: E402
+from contin import ConvergenceError, Point  # noqa: E402
+from contin.lowlevel import Stop  # noqa: E402
 from ribbon_model import exact  # noqa: E402
 from ribbon_model.laws import PAPER_LAWS  # noqa: E402
 

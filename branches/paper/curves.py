@@ -12,8 +12,8 @@ from branches.draw_diagram import colour_of
 from branches.paper.draw import STABLE, keep
 from branches.paper.page import Row, Section
 from branches.stability import LABEL, Watch
-from contin import Settings, curve
-from contin.lowlevel import follow, locate_branch_point
+from contin import Settings, curve, trace
+from contin.lowlevel import locate_branch_point, point_of
 from ribbon_model import exact
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import RIBBON
@@ -69,7 +69,7 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
     A fold is born with amplitude zero, and with M2 = 0: there nu is an even function of M2, extrapolated as a polynomial.
     """
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
-    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent)
+    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
     fold = branch.labelled("LP")[0]
     moments = [part * fold["M2"] for part in PARTS]
     limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (-200, 200), "M2": (moments[0], 100)}
@@ -88,7 +88,7 @@ def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, 
     """Where the branch that breaks all but one mirror leaves (m, n): (nu, kappa_n), shape (K, 2); its labelled points."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, events=Watch(RIBBON, system, x).monitors)
-    first = next(point for point in follow(system, x, settings, tangent) if point.label == LABEL)
+    first = next(point for point in trace(point_of(system, x), settings, tangent=tangent) if point.label == LABEL)
     system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)
     start = dataclasses.replace(first, label="BP", system=system, x=found.x, details=found)

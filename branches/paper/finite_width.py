@@ -16,8 +16,8 @@ from branches.display import Display
 from branches.draw_diagram import CONJUGATE, NATURAL, colour_of, conjugate, legend
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
-from contin import Settings, curve
-from contin.lowlevel import follow
+from contin import Settings, curve, trace
+from contin.lowlevel import point_of
 from ribbon_model import exact
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, label
 from ribbon_model.linear import thresholds
@@ -83,7 +83,7 @@ def _near_ribbon() -> float:
 def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     """(Gamma, kappa_n) of the fold of (1, 2), shape (K, 2), Gamma ascending; and of the place where it is born."""
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, NU, 10, 7, Gamma=10.0)
-    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent)
+    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
     fold = branch.labelled("LP")[0]
     limits = {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}
     up, down = (curve(fold, "Gamma", direction=sense, limits=limits, zeros={"Gamma": CHECKED[1:]}) for sense in (1, -1))

@@ -101,13 +101,13 @@ def _past(limit: float, side: int) -> float:
 def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str = "") -> Start:
     """The state at a labelled point of a primary branch, with kappa_n moved on."""
     from branches.stability import Watch
-    from contin import Settings
-    from contin.lowlevel import follow
+    from contin import Settings, trace
+    from contin.lowlevel import point_of
     from ribbon_model.seeds import primary_branch
 
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
     monitors = Watch(law, system, x).monitors if label == "SB" else ()
-    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors), tangent)
+    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors), tangent=tangent)
     point = branch.labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
     kappa_n = _past(point["kappa_n"], side)

@@ -8,10 +8,7 @@ from collections.abc import Iterator
 from typing import TextIO
 
 from contin import checks
-from contin.arrays import Array
 from contin.continuation.run import Continuation
-from contin.core.protocol import Discretization
-from contin.core.settings import Settings
 from contin.core.state import Reason, Stop
 from contin.errors import ProblemError
 from contin.results.branch import Branch
@@ -97,22 +94,3 @@ def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
     if len(branch.points) == 1 and branch.stop is not None and branch.stop.reason == Reason.LIMIT:
         raise ProblemError(f"limits: {branch.stop.message}; widen them, or start inside them")
     return branch
-
-
-def follow(
-    system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None, singular: bool = True
-) -> Branch:
-    """Run to the end and return the branch: `Continuation` as one call.
-
-    Examples
-    --------
-    >>> from contin import AlgebraicProblem, Settings
-    >>> from contin.lowlevel import Algebraic
-    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-    >>> branch = follow(Algebraic(parabola, ["a"]), np.array([1.0, 1.0]), Settings(direction=-1, limits={"a": (-1, 4)}))
-    >>> [point.label for point in branch if point.label]
-    ['EP', 'LP', 'EP']
-    """
-    run = Continuation(system, x, settings, tangent, singular=singular)
-    points = list(run)
-    return Branch(points, run.stop, run.notes)

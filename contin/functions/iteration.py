@@ -164,7 +164,7 @@ def minimum(potential: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, .
 
     Examples
     --------
-    >>> from contin import minimum
+    >>> from contin.lowlevel import minimum
     >>> (w,) = minimum(lambda w: (w[0] - 3) ** 2 + w[0] ** 4 / 4, [0.0])
     >>> round(w, 14)
     1.45616424613591
@@ -197,7 +197,7 @@ def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
     The rate w of w + w**3 = u, with its exact derivative 1/(1 + 3 w**2):
 
     >>> import numpy as np
-    >>> from contin import root
+    >>> from contin.lowlevel import root
     >>> from contin.lowlevel import Batch
     >>> batch = Batch([lambda u, p: root(lambda w: (w[0] + w[0] ** 3 - u.u,), [0.0])[0]], [0], ["u"], [], times=False)
     >>> given = np.zeros(1), np.array([[10.0]]), np.empty((0, 1)), np.empty(0)
@@ -234,7 +234,7 @@ def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
     --------
     The complementary energy of U = w**4/4 is 3 M**(4/3)/4, and its derivative the strain:
 
-    >>> from contin import gradient, least
+    >>> from contin.lowlevel import gradient, least
     >>> value, strain = gradient(lambda M: -least(lambda w: w[0] ** 4 / 4 - M * w[0], [1.0]), ["M"])(8.0)
     >>> round(value, 13), round(strain, 14)
     (12.0, 2.0)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,33 +13,18 @@ from contin import checks
 from contin.arrays import Array
 from contin.boundary.second_variation import SecondVariation, second_variation
 from contin.core.protocol import Discretization
-from contin.core.system import System
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
 from contin.errors import ProblemError
-from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
 from contin.results.profile import Profile
+from contin.results.record import Record
+from contin.results.sensitivity import sensitivities
 
 #: So many columns stand in the representation of a point.
 _SHOWN = 8
-
-
-def system_of(point: Point, what: str) -> System:
-    """Return the system of a point, where other parameters of its problem may become free.
-
-    Raises
-    ------
-    ProblemError
-        A point of a curve in two parameters; ``what`` names the argument.
-    """
-    system: Any = point.system
-    if system.on_curve:
-        raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
-    found: System = system
-    return found
 
 
 def underlying(point: Point) -> Point:
@@ -51,8 +36,8 @@ def underlying(point: Point) -> Point:
     return dataclasses.replace(point, label="", name="", x=point.x[: base.size], tangent=nowhere, system=base, details=None)
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
+@dataclass(frozen=True, eq=False, repr=False)
+class Point(Record):
     """One solution on a branch.
 
     Attributes
@@ -107,34 +92,6 @@ class Point:
     (True, ['a'])
     """
 
-    label: str
-    name: str
-    parameters: Mapping[str, float]
-    functionals: Mapping[str, float]
-    x: Array
-    tangent: Array
-    system: Discretization
-    arclength: float
-    iterations: int
-    newton_error: float
-    errors: Mapping[str, float] = field(default_factory=dict)
-    details: Any = None
-    index: int | None = None
-    nullity: int = 0
-    index_change: tuple[int | None, int | None] | None = None
-    breaks: tuple[str, ...] = ()
-    column: str = ""
-    value: float | None = None
-    discretization_error: float = np.nan
-
-    def __getattr__(self, name: str) -> Any:
-        """Return the functionals of a point of plain steps, which are computed when they are first asked for."""
-        if name != "functionals" or "system" not in vars(self):
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        found: Any = Trial.without_tangent(self.system, self.x).functionals
-        vars(self)["functionals"] = found
-        return found
-
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name.
 
@@ -171,11 +128,6 @@ class Point:
         positive where they are supercritical. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
-
-    @property
-    def is_simple_branch_point(self) -> bool:
-        """Two branches cross there, and their tangents are known."""
-        return finding_of(self.details).is_simple_branch_point
 
     @property
     def curves(self) -> tuple[str, ...]:
@@ -224,6 +176,46 @@ class Point:
         2
         """
         return portrait.plot(underlying(self), what, states, axes)
+
+    def sensitivities(
+        self, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
+    ) -> dict[str, dict[str, float]]:
+        """Return the derivatives of the free parameters at a special point with respect to every other parameter.
+
+        At a fold only that of its primary parameter is given, -(w.F_mu) / (w.F_lambda), w the left null vector (one
+        back-solve). At a branch point those of all free parameters are, the point staying one (of the two branches that cross
+        on F + beta psi = 0 where the bifurcation is imperfect). At any other point ``held`` keeps its value.
+
+        Parameters
+        ----------
+        by : sequence of str, optional
+            The other parameters; all that are not free by default.
+        held : str or callable, optional
+            For points that are neither, the quantity that stays fixed: a parameter, a functional, a state of an equilibrium, or
+            ``held(trial)``. By default it is the column that the point is about, the real part of the critical pair at a Hopf
+            point of an equilibrium, and at points of no special kind the first free parameter. At other special points it must
+            be given.
+
+        Returns
+        -------
+        dict
+            ``result[mu][lambda]`` is dlambda/dmu.
+
+        Raises
+        ------
+        ProblemError
+            A name that is not a parameter that is held fixed on the branch; ``held`` is no column, or missing.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> cubic = AlgebraicProblem(lambda u, p: (p.a - p.b * u.x + u.x**3,), ["x"], {"a": 0.0, "b": 3.0})
+        >>> fold = trace(solve(cubic, [0.0]), free=["a"], limits={"a": (-3, 3)}).labelled("LP")[0]  # a = 2, x = 1
+        >>> {name: round(value["a"], 6) for name, value in fold.sensitivities().items()}
+        {'b': 1.0}
+        """
+        checks.instance("point", self, Point, "a Point")  # of `contin.sensitivities`, as it was called in version 0.2
+        return sensitivities(self, by, held)
 
     def segment(self, index: int) -> Profile:
         """Return the solution on one segment of a `SegmentedProblem`, over its own coordinate; segments count from 0.

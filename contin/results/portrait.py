@@ -15,6 +15,8 @@ from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
 from contin.problems.statement import declared
 from contin.results.axes import new_axes
+from contin.results.profile import Profile
+from contin.results.record import Record, over_t
 
 #: Places at which a solution is drawn, for each interval of its mesh, and at least.
 _PER_INTERVAL, _FEWEST = 8, 400
@@ -24,13 +26,13 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#
 _MOST_STATES = len(_COLOURS)
 #: Powers of ten of the circles that are drawn beyond the unit circle, at most.
 _MOST_RINGS = 6
+#: What is said of a point of which there are no such pictures.
+_OVER_T = "plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem"
 
 
-def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
+def plot(point: Record, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
     """Draw one point; see `contin.Point.plot`."""
-    system = point.system
-    if not system.is_function_of_t:
-        raise ProblemError("plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem")
+    system = over_t(point, _OVER_T)
     drawings = _drawings(system)
     if what is not None and what not in drawings:
         raise ProblemError(f"what: {checks.shown(what)} must be one of {', '.join(drawings)}")
@@ -49,9 +51,9 @@ def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) 
     return axes
 
 
-def _drawings(system: Collocation) -> dict[str, Callable[[Any, tuple[str, ...], Any], None]]:
+def _drawings(system: Collocation) -> dict[str, Callable[[Record, tuple[str, ...], Any], None]]:
     """Return the pictures that there are of a point, by name."""
-    found: dict[str, Callable[[Any, tuple[str, ...], Any], None]] = {}
+    found: dict[str, Callable[[Record, tuple[str, ...], Any], None]] = {}
     if len(_known(system)) > 1:
         found["portrait"] = _portrait
     found["series"] = _series
@@ -81,26 +83,25 @@ def _known(system: Collocation) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
 
 
-def _courses(point: Any, names: Sequence[str]) -> list[tuple[Array, Array]]:
+def _courses(point: Record, names: Sequence[str]) -> list[tuple[Array, Array]]:
     """Return times in the user's units (K,) and states (K, n) of each segment; a state that it does not have is NaN."""
-    problem = point.system.problem
+    system = over_t(point, _OVER_T)
+    problem = system.problem
     if not declared(problem, "pieces"):
         return [_course(point, names)]
     found = []
     for index in range(len(problem.pieces)):
-        profile = point.segment(index)
-        s = profile.begin + (profile.end - profile.begin) * np.linspace(
-            0, 1, max(_FEWEST, _PER_INTERVAL * point.system.intervals)
-        )
+        profile = Profile(point, index)
+        s = profile.begin + (profile.end - profile.begin) * np.linspace(0, 1, max(_FEWEST, _PER_INTERVAL * system.intervals))
         states = profile(s)
         columns = [states[:, profile.names.index(name)] if name in profile.names else np.full(len(s), np.nan) for name in names]
         found.append((s, np.stack(columns, axis=1)))
     return found
 
 
-def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array]:
+def _course(point: Record, names: Sequence[str]) -> tuple[Array, Array]:
     """Return times in the user's units (K,), and states (K, n)."""
-    system = point.system
+    system: Any = point.system
     a, b = system.problem.domain
     cycle = system.is_cycle
     once = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
@@ -120,7 +121,7 @@ def _on_circles(t: Array, states: Array, periods: Array) -> tuple[Array, Array]:
     return np.insert(t, after + 1, t[after]), np.insert(states, after + 1, gaps, axis=0)
 
 
-def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
+def _portrait(point: Record, names: tuple[str, ...], axes: Any) -> None:
     """Draw the second state against the first, with an arrow in the sense of time; segments in colours of their own."""
     courses = _courses(point, names[:2])
     for index, (_, states) in enumerate(courses):
@@ -139,7 +140,7 @@ def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
     axes.set(xlabel=names[0], ylabel=names[1])
 
 
-def _series(point: Any, names: tuple[str, ...], axes: Any) -> None:
+def _series(point: Record, names: tuple[str, ...], axes: Any) -> None:
     """Draw the states over time; where segments meet there is a line."""
     names = names[:_MOST_STATES]
     courses = _courses(point, names)
@@ -156,7 +157,7 @@ def _series(point: Any, names: tuple[str, ...], axes: Any) -> None:
         axes.set(ylabel=names[0])
 
 
-def _multipliers(point: Any, names: tuple[str, ...], axes: Any) -> None:
+def _multipliers(point: Record, names: tuple[str, ...], axes: Any) -> None:
     """Draw the Floquet multipliers and the unit circle; outside of it distances from 0 are 1 + log10 |multiplier|."""
     found = floquet(point.system, point.x, point.tangent)
     size = found.logarithms.real

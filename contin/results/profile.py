@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.problems.statement import declared
+from contin.results.record import Record, over_t
 
 
 class Profile:
@@ -25,16 +24,18 @@ class Profile:
         States there; ``profile["theta"]`` is one of them.
     """
 
-    def __init__(self, point: Any, index: int) -> None:
-        problem = point.system.problem
+    def __init__(self, point: Record, index: int) -> None:
+        nothing = "segment: the problem has no segments; state it as a SegmentedProblem"
+        self._system, self._x = over_t(point, nothing), point.x
+        problem = self._system.problem
         if not declared(problem, "pieces"):
-            raise ProblemError("segment: the problem has no segments; state it as a SegmentedProblem")
+            raise ProblemError(nothing)
         checks.whole("segment", index, 0, len(problem.pieces) - 1)
-        self._point, self._at = point, problem.pieces[index].at
+        self._at = problem.pieces[index].at
         self.names = problem.pieces[index].names
         self.begin, self.end = problem.extent(index, point.parameters)
-        self.s: Array = self.begin + (self.end - self.begin) * point.system.nodes
-        self.states: Array = point.system.states(point.x)[:, self._at]
+        self.s: Array = self.begin + (self.end - self.begin) * self._system.nodes
+        self.states: Array = self._system.states(point.x)[:, self._at]
 
     def __getitem__(self, name: str) -> Array:
         """Return one state at the nodes, shape (K,).
@@ -52,5 +53,5 @@ class Profile:
     def __call__(self, s: Array) -> Array:
         """Return the states at coordinates (m,) between the ends of the segment, shape (m, n)."""
         t = (np.atleast_1d(np.asarray(s, dtype=float)) - self.begin) / (self.end - self.begin)
-        states: Array = self._point.system.evaluate(self._point.x, t)[:, self._at]
+        states: Array = self._system.evaluate(self._x, t)[:, self._at]
         return states

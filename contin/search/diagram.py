@@ -25,7 +25,8 @@ from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import declared
 from contin.results import plot
 from contin.results.branch import Branch
-from contin.results.point import Point, system_of
+from contin.results.point import Point
+from contin.results.record import system_of
 from contin.search.cycle_starts import switched, switches
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -11,7 +11,6 @@ from contin import checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.basis import basis, interpolation
-from contin.continuation.progress import follow
 from contin.continuation.run import Continuation
 from contin.core.settings import Settings
 from contin.core.system import System
@@ -152,7 +151,7 @@ def _looked_for(system: System, x: Array, scales: Mapping[str, float]) -> Iterat
     """Yield the labelled points near x, from some steps back on, both ways."""
     primary = system.free[0]
     wanted = float(x[system.parameter_index(primary)])
-    back = follow(system, x, Settings(direction=-1, step=_STEP, max_points=2, errors=False, scales=scales)).points[-1]
+    *_, back = Continuation(system, x, Settings(direction=-1, step=_STEP, max_points=2, errors=False, scales=scales))
     way = 1 if wanted >= back[primary] else -1
     for direction in (way, -way):
         settings = Settings(direction=direction, step=_STEP, max_points=_LOOKS, scales=scales)

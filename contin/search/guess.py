@@ -18,6 +18,7 @@ from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.results.point import Point
+from contin.results.record import over_t
 from contin.search.lagrange import with_guessed_multipliers
 
 #: A mesh point of a guess that lies closer to the end of the part that is computed is left out. Ten times
@@ -150,11 +151,7 @@ def _numbers(values: Any, count: int | None = None) -> Array:
 
 def _meshed(guess: Point) -> Collocation:
     """Return the system of a guess that is a solution of a boundary value problem."""
-    system: Any = guess.system
-    if not system.is_function_of_t:
-        raise ProblemError("guess: a Point must be a solution of a boundary value problem")
-    found: Collocation = system
-    return found
+    return over_t(guess, "guess: a Point must be a solution of a boundary value problem")
 
 
 def _mesh_of(system: Collocation, order: int) -> Array:

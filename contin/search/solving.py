@@ -19,7 +19,8 @@ from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.angles import winding_names
 from contin.problems.statement import forget_changed, with_multipliers
-from contin.results.point import Point, point_of, system_of, underlying
+from contin.results.point import Point, point_of, underlying
+from contin.results.record import system_of
 from contin.search.deflation import correct_away
 from contin.search.guess import Guess, Options, first_guess
 

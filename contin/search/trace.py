@@ -12,8 +12,9 @@ from contin import checks
 from contin.arrays import Array
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
+from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
-from contin.errors import ConvergenceError, ProblemError
+from contin.errors import ConvergenceError, ProblemError, warn
 from contin.events.branch_point import locate_branch_point
 from contin.events.labelled import finding_of
 from contin.linalg.orientation import oriented_along
@@ -28,7 +29,7 @@ _HERE = 1e-5
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
-          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
+          tangent: Array | None = None, progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
     Ctrl-C ends the run: the branch so far is returned.
@@ -47,6 +48,9 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from there, to the saddle. By
         default the one that it was found on, with ``direction`` that of the primary parameter.
+    tangent : ndarray, shape (size,), optional
+        Where branches cross and ``start`` does not know their tangents, as a solution that is known in closed form does
+        (`contin.lowlevel.point_of`): the one to leave along, in the unknowns of ``start.system``.
     progress : bool, optional
         Show one line on standard error while the run is under way: by default where standard error is a terminal.
 
@@ -65,27 +69,62 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     checks.instance("start", start, Point, "a Point")
     settings, shown = settings_with(settings, options), Progress(progress)
+    system, x, along, singular = _first(start, settings, free, branch, tangent)
+    return follow_until_interrupted(Continuation(system, x, settings, along, singular=singular), shown)
+
+
+def _first(
+    start: Point, settings: Settings, free: Sequence[str] | None, branch: int | None, tangent: Array | None
+) -> tuple[Discretization, Array, Array | None, bool]:
+    """Return the system of a run, its first x, the tangent there where Newton's method shall not find it, and whether branches
+    cross there.
+    """
     start = start if free is None else _solution(start, checks.names("free", free))
     system: Any = start.system
-    x = start.x
+    x, way = start.x, settings.direction
     if not system.on_curve and forget_changed(system.problem):
         system = system.with_parameters({})
+    if tangent is not None:
+        if branch is not None or free is not None:
+            raise ProblemError("tangent: must be left out where branch or free is given")
+        return system, x, way * checks.array("tangent", tangent, (system.size,)), True
     if branch is not None:
         checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
-        cycles, x, tangent = switched(start, settings.mesh.min_intervals, free)
-        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
+        cycles, x, along = switched(start, settings.mesh.min_intervals, free)
+        return cycles, x, way * along, True
     if branch == 1 and leaves_saddle_node(start):
         if free is not None:
             raise ProblemError("free: the curve that leaves at NCH has the parameters of the one it was found on; leave it out")
-        orbits, x, tangent = from_non_central(start)
-        return follow_until_interrupted(Continuation(orbits, x, settings, settings.direction * tangent, singular=False), shown)
+        orbits, x, along = from_non_central(start)
+        return orbits, x, way * along, False
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
-        return follow_until_interrupted(Continuation(system, x, settings, _own_tangent(start, system, settings)), shown)
-    tangent = settings.direction * _tangent(start, system, branch)
-    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+        return system, x, _own_tangent(start, system, settings), True
+    return system, x, way * _tangent(start, system, branch), True
+
+
+def follow(
+    system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None, singular: bool = True
+) -> Branch:
+    """Return `contin.trace` of a first point, under the name and with the arguments of version 0.2.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic, point_of
+    >>> parabola = Algebraic(AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0}), ["a"])
+    >>> branch = trace(point_of(parabola, np.array([1.0, 1.0])), direction=-1, limits={"a": (-1, 4)})  # in place of it
+    >>> [point.label for point in branch if point.label]
+    ['EP', 'LP', 'EP']
+    """
+    warn(
+        "contin.lowlevel.follow(system, x, ...) is contin.trace(contin.lowlevel.point_of(system, x), ...) now",
+        DeprecationWarning,
+    )
+    run = Continuation(system, x, settings, tangent, singular=singular)
+    return Branch(list(run), run.stop, run.notes)
 
 
 def _solution(start: Point, free: Sequence[str]) -> Point:

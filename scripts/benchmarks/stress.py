@@ -61,7 +61,7 @@ def _case(what, m, n, nu, changes) -> dict:
         if "digits" in given:
             x = np.array([float(f"{value:.{given['digits']}g}") for value in x])
             _, x, tangent = leave_circle(system, x)
-        branch = contin.lowlevel.follow(system, x, settings, tangent)
+        branch = contin.trace(contin.lowlevel.point_of(system, x), settings, tangent=tangent)
     except (contin.ContinError, ValueError) as error:
         return {"what": what, "mode": (m, n), "stop": f"refused: {error}", "points": 0, "seconds": time.perf_counter() - began}
     seconds = time.perf_counter() - began

@@ -70,7 +70,7 @@ def test_a_reason_of_another_kind_is_kept():
     point = contin.solve(circle, [0.8])
     run = contin.lowlevel.Continuation(*point.system.with_free(["a"], point.x), contin.Settings(max_points=5))
     list(run)
-    run.stop = contin.Stop("no convergence", "h changed its sign, but no zero of it was found on the branch")
+    run.stop = contin.lowlevel.Stop("no convergence", "h changed its sign, but no zero of it was found on the branch")
     assert advice.no_state(run, "a = 1") is run.stop
 
 

@@ -8,8 +8,8 @@ from branches.display import Display
 from branches.job import run_branch
 from branches.read import read_branch
 from branches.stability import LABEL, Watch
-from contin import Settings
-from contin.lowlevel import follow, locate_branch_point
+from contin import Settings, trace
+from contin.lowlevel import locate_branch_point, point_of
 from ribbon_model.domains import HALF_LOOPS
 from ribbon_model.laws import RIBBON
 from ribbon_model.secondary import secondary_branch
@@ -120,7 +120,7 @@ def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
         pytest.skip("with --full only")
     system, x, tangent = primary_branch(RIBBON, m, n, nu, 10, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, events=Watch(RIBBON, system, x).monitors)
-    found = follow(system, x, settings, tangent).labelled(LABEL)
+    found = trace(point_of(system, x), settings, tangent=tangent).labelled(LABEL)
     assert len(found) == AGREEMENT[m, n, nu]
     for point in found:
         for reversal in point.details.keeps:

@@ -116,8 +116,8 @@ def test_every_argument_of_trace(argument, start):
 @given(anything)
 def test_the_others(start, value):
     for call in (
-        lambda: contin.curve(start, value), lambda: contin.curve(value, "lam"), lambda: contin.sensitivities(start, value),
-        lambda: contin.sensitivities(value), lambda: contin.solve(value, [0]), lambda: contin.trace(start, mesh=value),
+        lambda: contin.curve(start, value), lambda: contin.curve(value, "lam"), lambda: start.sensitivities(value),
+        lambda: contin.Point.sensitivities(value), lambda: contin.solve(value, [0]), lambda: contin.trace(start, mesh=value),
         lambda: contin.diagram(start, free=value), lambda: contin.diagram(value),
         lambda: contin.diagram(start, depth=value, free=()), lambda: contin.diagram(start, symmetries=value),
     ):  # fmt: skip

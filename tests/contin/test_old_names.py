@@ -15,7 +15,8 @@ DOWN = {"free": ["a"], "direction": -1, "limits": {"a": (-1, 4)}}
 
 @pytest.mark.parametrize("name, place", [
     ("TestFunction", "contin.Event"), ("Monitor", "contin.Event"), ("Collocation", "contin.lowlevel.Collocation"),
-    ("read_auto", "contin.auto07p.read_auto"),
+    ("read_auto", "contin.auto07p.read_auto"), ("minimum", "contin.lowlevel.minimum"), ("Stop", "contin.lowlevel.Stop"),
+    ("sensitivities", "contin.Point.sensitivities"),
 ])  # fmt: skip
 def test_a_first_name(name, place):
     with pytest.warns(DeprecationWarning, match=f"contin.{name} is {place} now") as told:
@@ -23,6 +24,18 @@ def test_a_first_name(name, place):
     module, _, new = place.rpartition(".")
     assert found is getattr(contin if module == "contin" else getattr(contin, module.removeprefix("contin.")), new)
     assert told[0].filename == __file__
+
+
+def test_follow_is_trace():
+    system = contin.lowlevel.Algebraic(PARABOLA, ["a"])
+    settings = contin.Settings(direction=-1, limits={"a": (-1, 4)})
+    with pytest.warns(DeprecationWarning, match="follow.*is contin.trace") as told:
+        old = contin.lowlevel.follow(system, [1.0, 1.0], settings)
+    assert told[0].filename == __file__
+    new = contin.trace(contin.lowlevel.point_of(system, [1.0, 1.0]), settings)
+    assert [(point.label, *point.x) for point in old] == [(point.label, *point.x) for point in new]
+    with pytest.warns(DeprecationWarning, match="sensitivities"):
+        assert contin.sensitivities(new.labelled("LP")[0]) == {}
 
 
 @pytest.mark.parametrize("name", ["test_functions", "monitors"])
@@ -77,5 +90,5 @@ def test_sensitivities_of_maps_leave_out_rounds():
     """The fold of Hénon's map is at a = -(1 - b)^2 / 4."""
     henon = MapProblem(lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * u.x), ["x", "y"], {"a": 0.1, "b": 0.3})
     (fold,) = contin.trace(contin.solve(henon, [0.9, 0.3]), free=["a"], direction=-1, max_points=60).labelled("LP")
-    assert list(contin.sensitivities(fold)) == ["b"]
-    assert contin.sensitivities(fold)["b"]["a"] == pytest.approx(0.35, abs=1e-12)
+    assert list(fold.sensitivities()) == ["b"]
+    assert fold.sensitivities()["b"]["a"] == pytest.approx(0.35, abs=1e-12)

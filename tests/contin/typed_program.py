@@ -19,7 +19,7 @@ for point in branch:
         contin.trace(point, branch=1, direction=-1)
 why: str = branch.stop.advice if branch.stop else ""
 contin.trace(branch.points[3], contin.Settings(zeros={"lam": [1.0]}, events=[contin.Event("UZ", "one", lambda t: t["lam"])]))
-slopes: dict[str, dict[str, float]] = contin.sensitivities(branch.labelled("LP")[0], by=["k"])
+slopes: dict[str, dict[str, float]] = branch.labelled("LP")[0].sensitivities(by=["k"])
 folds: contin.Branch = contin.curve(branch.labelled("LP")[0], "k", max_points=10)
 contin.save(branch, "branch.npz")
 again: contin.Branch = contin.load(problem, "branch.npz")

@@ -11,12 +11,12 @@ from ribbon_model.solution import Solution
 
 def test_a_saddle_lies_between_its_two_circles():
     """(1, 2) of the flat rod goes from one turn to three and is subcritical: its states separate the two."""
-    from contin import Settings
-    from contin.lowlevel import follow
+    from contin import Settings, trace
+    from contin.lowlevel import point_of
 
     system, x, tangent = primary_branch(FLAT_ROD, 1, 2, 0.3, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-10, 10)}, zeros={"kappa_n": [3.0]}, errors=False)
-    (point,) = follow(system, x, settings, tangent).labelled("UZ")
+    (point,) = trace(point_of(system, x), settings, tangent=tangent).labelled("UZ")
     saddle = Solution.of(point)
     assert saddle.index().index == 1
     first, last = sides(saddle.equilibrium())

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contin import Settings, trace
-from contin.lowlevel import correct, follow
+from contin.lowlevel import correct, point_of
 from ribbon_model import exact
 from ribbon_model.domains import HALF_LOOP, LOOP
 from ribbon_model.equilibrium import directors, on_directors
@@ -21,7 +21,7 @@ NU = 0.3
 def branch():
     """(1, 2), the branch of Fig. 11, at the settings that scenes use by default."""
     system, x, tangent = primary_branch(RIBBON, 1, 2, NU, 10, 7)
-    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent)
+    return trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent=tangent)
 
 
 def test_fold_and_end_of_m1_n2(branch):
@@ -82,11 +82,11 @@ def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch
     """Circle bifurcations 2.5, 2.931, 3.1 of m = 1 from (27), as simple branch points; then (1, 2), with R3 free but zero."""
     system = HALF_LOOP.discretize(RIBBON, 12, 6, {"nu": NU})
     settings = Settings(limits={"kappa_n": (0, 3.15)}, max_step=0.05)
-    points = follow(system, HALF_LOOP.circle(system, 1, 2.0), settings).labelled("BP")
+    points = trace(point_of(system, HALF_LOOP.circle(system, 1, 2.0)), settings).labelled("BP")
     expected = [thresholds(RIBBON, 1, n, NU)[0] for n in (2, 3, 4)]
     assert [point["kappa_n"] for point in points] == pytest.approx(expected, abs=1e-9)
     system, x, tangent = half_loop_branch(RIBBON, 1, 2, NU, 16, 6)
-    other = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent)
+    other = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent=tangent)
     assert other.labelled("LP")[0]["kappa_n"] == pytest.approx(branch.labelled("LP")[0]["kappa_n"], abs=1e-10)
     assert np.abs(other.column("R3")).max() < 1e-9
     assert other.points[-1]["kappa_n"] == pytest.approx(-0.5, abs=1e-8)
@@ -95,7 +95,7 @@ def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch
 @pytest.mark.parametrize(("m", "n"), [(1, 3), (3, 4), (3, 5), (5, 6), (1, 4)])
 def test_folds_and_ends_against_the_quadrature(m, n):
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 10, 7)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent)
+    found = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent=tangent)
     expected = exact.folds(m, n, NU)
     folds = found.labelled("LP")
     assert [p["kappa_n"] for p in folds] == pytest.approx([p.kappa_n for p in expected], abs=1e-9)
@@ -109,7 +109,7 @@ def test_folds_and_ends_against_the_quadrature(m, n):
 def test_a_branch_that_runs_away():
     """(3, 1) has 2 n < m: it goes to kappa_n -> -infinity; at -60 it is where the quadrature says."""
     system, x, tangent = primary_branch(RIBBON, 3, 1, NU, 10, 7)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 100)}), tangent)
+    found = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-60, 100)}), tangent=tangent)
     assert found.stop.reason == "limit" and not found.labelled("LP")
     end = exact.curve(3, 1, NU, kappa_limits=(-60.0, 100.0))[-1]
     assert found.points[-1]["kappa_n"] == pytest.approx(-60, abs=1e-10)
@@ -120,7 +120,7 @@ def test_a_branch_that_runs_away():
 def test_rods_leave_the_circle_downwards_and_have_no_fold(law):
     """Section 6.3: for rods no fold exists on the branch from m = 1 to m = 3; it ends where (25b) says for (3, 2)."""
     system, x, tangent = primary_branch(law, 1, 2, NU, 10, 7)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent)
+    found = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
     assert not found.labelled("LP")
     assert found.points[-1]["kappa_star"] == pytest.approx(3, abs=1e-8)
     assert min(abs(found.points[-1]["kappa_n"] - k) for k in thresholds(law, 3, 2, NU)) < 1e-8
@@ -138,7 +138,7 @@ def test_a_secondary_branch_on_the_half_loop():
     followed from the first, has R = 0 again. (That an index changes near -22 is known from a Fourier computation.)
     """
     system, x, tangent = half_loop_branch(RIBBON, 3, 1, NU, 16, 6)
-    primary = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-200, 100)}), tangent)
+    primary = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-200, 100)}), tangent=tangent)
     first, second = primary.labelled("BP")
     assert first["kappa_n"] == pytest.approx(-21.6, abs=0.5)
     loop_around = trace(first, branch=1, limits={"kappa_n": (-300, 100)})

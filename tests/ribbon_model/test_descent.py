@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contin import Settings
-from contin.lowlevel import follow
+from contin import Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model import exact, second_variation
 from ribbon_model.descent import METRICS, descend, identify, modes, perturbed
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
@@ -45,7 +45,7 @@ def buckled(law, m, n, label="UZ", kappa_n=None):
     """A point of a primary branch by collocation: at kappa_n, or its first fold."""
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
     zeros = {} if kappa_n is None else {"kappa_n": [kappa_n]}
-    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-20, 20)}, zeros=zeros), tangent)
+    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-20, 20)}, zeros=zeros), tangent=tangent)
     point = branch.labelled(label)[0]
     return Solution.of(point).equilibrium()
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from contin import MeshControl, Settings
-from contin.lowlevel import follow
+from contin import MeshControl, Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model import exact
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import thresholds
@@ -14,7 +14,7 @@ SETTINGS = {"trivial": "M2", "limits": {"kappa_n": (-100, 100)}, "max_step": 10.
 
 def branch(law, m, n, nu, **options):
     system, x, tangent = primary_branch(LAWS[law], m, n, nu, 8, 7)
-    return follow(system, x, Settings(**SETTINGS, **options), tangent)
+    return trace(point_of(system, x), Settings(**SETTINGS, **options), tangent=tangent)
 
 
 @pytest.mark.parametrize(
@@ -66,6 +66,6 @@ def test_a_circle_is_left_where_the_law_bends_on_a_small_scale(n, nu):
     """kappa_n lies just below m / nu: the ribbon's a = c - nu kappa_n is 6e-4 on the circle of (1, 38)."""
     system, x, tangent = primary_branch(LAWS["ribbon"], 1, n, nu, 8, 7)
     assert abs(tangent[system.parameter_index("kappa_n")]) < 1e-6  # a pitchfork
-    found = follow(system, x, Settings(**SETTINGS), tangent)
+    found = trace(point_of(system, x), Settings(**SETTINGS), tangent=tangent)
     end = exact.curve(1, n, nu)[-1]
     assert found.stop.reason == "limit" and found.points[-1]["kappa_star"] == pytest.approx(end.kappa_star, abs=1e-8)

@@ -18,7 +18,9 @@ NU = 0.3
 def on_cells(law, m, n, limits, every):
     """Solutions on a primary branch, by the cell."""
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
-    points = contin.lowlevel.follow(system, x, contin.Settings(trivial="M2", limits={"kappa_n": limits}), tangent).points[1:-1]
+    points = contin.trace(
+        contin.lowlevel.point_of(system, x), contin.Settings(trivial="M2", limits={"kappa_n": limits}), tangent=tangent
+    ).points[1:-1]
     return [Solution.of(point) for point in points if not point.label][::every]
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import Settings
-from contin.lowlevel import follow
+from contin import Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model.exact import curve, end, folds, refine, solve
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import thresholds
@@ -106,7 +106,7 @@ def test_against_the_collocation(law, root, m, n):
     """Both ends, and kappa* half-way at the collocation's own kappa_n. (3, 1) of the flat rod goes to the limit."""
     system, x, tangent = primary_branch(LAWS[law], m, n, 0.3, 8, 7, root=root)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 60)})
-    found = follow(system, x, settings, tangent).points
+    found = trace(point_of(system, x), settings, tangent=tangent).points
     points = curve(m, n, 0.3, (-100, 60), law=law, root=root)
     for one, other in ((found[0], points[0]), (found[-1], points[-1])):
         assert (one["kappa_n"], one["kappa_star"]) == pytest.approx((other.kappa_n, other.kappa_star), abs=1e-9)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import contin
-from contin import Settings
-from contin.lowlevel import follow
+from contin import Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model import convexity, exact_finite_width, finite_width
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings, from_label, label
@@ -23,7 +23,7 @@ NU = 0.3
 
 def followed(m, n, Gamma, **settings):
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, NU, 10, 7, Gamma=Gamma)
-    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, **settings), tangent)
+    return trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, **settings), tangent=tangent)
 
 
 @functools.cache
@@ -68,7 +68,7 @@ def test_the_membrane_function_against_its_definition():
 
 
 def slope_of(function):
-    by = contin.gradient(function, ["z"])
+    by = contin.lowlevel.gradient(function, ["z"])
     return lambda z: by(z)[1]
 
 
@@ -181,7 +181,7 @@ def test_thresholds_from_the_flat_rod_to_the_ribbon():
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})
     start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
-    found = follow(system, start, Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
+    found = trace(point_of(system, start), Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
     expected = [thresholds(FINITE_WIDTH, 1, n, NU, 10.0)[0] for n in (2, 3)]
     assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)
     low, high = stability_interval(FINITE_WIDTH, 1, NU, 10.0)
@@ -239,7 +239,7 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
     ends = convexity.test_functions(FINITE_WIDTH)
     for intervals, degree in ((10, 7), (40, 4)):
         system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, nu, intervals, degree, Gamma=Gamma)
-        found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
+        found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
         assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([fold], abs=1e-6)
 
 
@@ -277,7 +277,7 @@ def test_a_branch_on_which_the_energy_has_two_minima():
     """
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, 0.4, 10, 7, Gamma=40.0)
     ends = convexity.test_functions(FINITE_WIDTH)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
+    found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([27.387660, -43.957859], abs=1e-6)
     assert found.stop.reason == "trivial branch"
     assert found.points[-1]["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 9, 5, 0.4, 40.0)[0], abs=1e-9)
@@ -288,7 +288,7 @@ def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
     """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 10, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
+    found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
     assert found.points[-1]["kappa_n"] == pytest.approx(end, abs=0.01)
 
@@ -297,7 +297,7 @@ def test_a_flat_rod_of_no_width():
     """Gamma = 0: the branch (1, 2) of the flat rod, point by point in kappa_n and omega."""
     found = followed(1, 2, 0.0, zeros={"kappa_n": [2.0]})
     system, x, tangent = primary_branch(FLAT_ROD, 1, 2, NU, 10, 7)
-    flat = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, zeros={"kappa_n": [2.0]}), tangent)
+    flat = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, zeros={"kappa_n": [2.0]}, tangent=tangent)
     ours, theirs = found.labelled("UZ")[0], flat.labelled("UZ")[0]
     assert ours["M2"] == pytest.approx((1 - NU**2) * theirs["M2"], abs=1e-9)
     assert ours["kappa_star"] == pytest.approx((1 - NU**2) * theirs["kappa_star"] + NU**2 * 2.0, abs=1e-9)

@@ -20,7 +20,7 @@ MOMENTS = [(0.9, 0.5, 0.0), (0.6, -0.8, 0.4), (1.3, 0.0, -0.3), (2.0, 3.0, 0.5)]
 
 
 BY = ("M1", "M2", "M3", "kappa_n")
-RIBBON_RESPONSE, WIDE_RESPONSE = contin.gradient(plate.ribbon, BY), contin.gradient(plate.finite_width, BY)
+RIBBON_RESPONSE, WIDE_RESPONSE = contin.lowlevel.gradient(plate.ribbon, BY), contin.lowlevel.gradient(plate.finite_width, BY)
 
 
 def isotropic(nu):

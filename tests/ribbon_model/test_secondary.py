@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import ConvergenceError, MeshControl, Newton, Settings
-from contin.lowlevel import correct, follow
+from contin import ConvergenceError, MeshControl, Newton, Settings, trace
+from contin.lowlevel import correct, point_of
 from ribbon_model.domains import HALF_LOOPS, LOOP
 from ribbon_model.equilibrium import directors, on_directors
 from ribbon_model.laws import FLAT_ROD, RIBBON
@@ -28,7 +28,7 @@ def at(law, m, n, kappa_n):
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
     ends = sorted([kappa_n, x[system.parameter_index("kappa_n")]])
     settings = Settings(trivial="M2", limits={"kappa_n": (ends[0] - 1, ends[1] + 1)}, zeros={"kappa_n": [kappa_n]})
-    (point,) = follow(system, x, settings, tangent).labelled("UZ")
+    (point,) = trace(point_of(system, x), settings, tangent=tangent).labelled("UZ")
     return point
 
 
@@ -38,7 +38,7 @@ def leave(law, m, n, kappa_n, reversal, sense=1, zeros=()):
     system, x, tangent = secondary_branch(Solution.of(at(law, m, n, kappa_n)), HALF_LOOPS[reversal])
     newton = Newton(1e-8)  # beside the bifurcation round-off is that large along its kernel
     settings = Settings(max_points=12, mesh=MeshControl(1e-11), newton=newton, zeros={"kappa_n": zeros})
-    return follow(system, x, settings, sense * tangent)
+    return trace(point_of(system, x), settings, tangent=sense * tangent)
 
 
 #: Where, from the index along the primary branch (an eigenvalue in Fourier coefficients passes zero), which knows nothing of

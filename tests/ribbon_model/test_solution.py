@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from contin import Settings
-from contin.lowlevel import follow
+from contin import Settings, trace
+from contin.lowlevel import point_of
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, HALF_LOOPS, LOOP
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law
@@ -16,7 +16,7 @@ from ribbon_model.solution import Solution
 @pytest.fixture(scope="module")
 def point():
     system, x, tangent = primary_branch(FLAT_ROD, 3, 2, 0.3, 8, 7)
-    return follow(system, x, Settings(max_points=5), tangent).points[-1]
+    return trace(point_of(system, x), Settings(max_points=5), tangent=tangent).points[-1]
 
 
 def test_a_point_is_all_that_it_takes(point):

@@ -13,7 +13,7 @@ from conjugate_points import conjugate_index
 from scipy.optimize import brentq
 
 from contin import MeshControl, Settings, trace
-from contin.lowlevel import correct, follow
+from contin.lowlevel import correct, point_of
 from ribbon_model import linear
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
@@ -33,14 +33,14 @@ def equilibrium(point):
 @functools.cache
 def branch(m, n, law=RIBBON, lowest=-60.0):
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
-    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (lowest, 100)}, max_step=1.0), tangent)
+    return trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (lowest, 100)}, max_step=1.0), tangent=tangent)
 
 
 @functools.cache
 def secondary():
     """The branch with R != 0 that leaves (3, 1), on the half loop."""
     system, x, tangent = half_loop_branch(RIBBON, 3, 1, NU, 16, 6)
-    primary = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-40, 100)}), tangent)
+    primary = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-40, 100)}), tangent=tangent)
     leaves = primary.labelled("BP")[0]
     return leaves, trace(leaves, branch=1, limits={"kappa_n": (-60, 100)})
 
@@ -151,7 +151,7 @@ def crossing(law, m, n, name, low, high, intervals, degree):
     row = np.zeros(system.size)
     row[system.parameter_index("kappa_n")] = 1.0
     settings = Settings(trivial="M2", limits={"kappa_n": (low - 1, 100)}, zeros={"kappa_n": [high]}, mesh=MeshControl(every=0))
-    (last,) = follow(system, x, dataclasses.replace(settings, errors=False), tangent).labelled("UZ")
+    (last,) = trace(point_of(system, x), dataclasses.replace(settings, errors=False), tangent=tangent).labelled("UZ")
 
     def determinant(kappa_n):
         x = correct(system, last.x, row, kappa_n).x

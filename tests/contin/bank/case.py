@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from contin import Branch, Point, Settings, Stop
-from contin.lowlevel import Continuation
+from contin import Branch, Point, Settings
+from contin.lowlevel import Continuation, Stop
 
 #: Wanted agreement with the reference, relative to max(1, |value|).
 TOLERANCE = 1e-9

@@ -111,7 +111,7 @@ def test_a_hamiltonian_instead_of_the_energy():
 
 def stiffening(m):
     """The maximum of m w - (w**2 + w**4 / 4) / 2 over w, found by iteration."""
-    (w,) = contin.minimum(lambda w: (w[0] ** 2 + w[0] ** 4 / 4) / 2 - m * w[0], [0.0])
+    (w,) = contin.lowlevel.minimum(lambda w: (w[0] ** 2 + w[0] ** 4 / 4) / 2 - m * w[0], [0.0])
     return m * w - (w**2 + w**4 / 4) / 2
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from bank.closed_forms import bratu
 
-from contin import BoundaryValueProblem, MeshControl, Settings, solve
+from contin import BoundaryValueProblem, MeshControl, Settings, solve, trace
 from contin.collocation.mesh import adapted_mesh, density
-from contin.lowlevel import Collocation, basis, follow
+from contin.lowlevel import Collocation, basis, point_of
 
 DEGREES = range(2, 9)
 
@@ -170,7 +170,7 @@ def test_the_mesh_follows_a_layer_and_the_number_of_intervals_the_tolerance():
     x, slopes, counts = system.pack(start, {"eps": 1.0}), [], []
     for tolerance in (1e-9, 1e-12):
         settings = Settings(direction=-1, limits={"eps": (1e-3, 2)}, mesh=MeshControl(tolerance), max_step=0.3)
-        end = follow(system, x, settings).points[-1]
+        end = trace(point_of(system, x), settings).points[-1]
         assert end["eps"] == pytest.approx(1e-3, abs=1e-12)
         h = np.diff(end.system.mesh)
         assert h.max() / h.min() > 10

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Event, ProblemError, Settings, solve, trace
-from contin.lowlevel import Collocation, Continuation, follow
+from contin.lowlevel import Collocation, Continuation, point_of
 
 
 def bratu_start(intervals=10, degree=6):
@@ -21,7 +21,9 @@ def bratu_start(intervals=10, degree=6):
 @pytest.fixture(scope="module")
 def branch():
     """Bratu's problem from lam = 0 past the fold to a mean of 3."""
-    return follow(*bratu_start(), Settings(limits={"lam": (-1, 4), "mean": (-1, 3)}, zeros={"lam": [1.0, 3.0], "mean": [0.5]}))
+    return trace(
+        point_of(*bratu_start()), Settings(limits={"lam": (-1, 4), "mean": (-1, 3)}, zeros={"lam": [1.0, 3.0], "mean": [0.5]})
+    )
 
 
 def test_the_fold_of_bratus_problem(branch):
@@ -53,21 +55,21 @@ def test_user_zeros_on_both_sides_of_a_fold(branch):
 def test_a_test_function_of_ones_own():
     """u(1/2) = 1: lam from the closed form."""
     centre = Event("UZ", "centre", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 1.0)
-    (point,) = follow(*bratu_start(), Settings(limits={"mean": (-1, 1)}, events=[centre])).labelled("UZ")
+    (point,) = trace(point_of(*bratu_start()), Settings(limits={"mean": (-1, 1)}, events=[centre])).labelled("UZ")
     assert point.name == "centre"
     assert point["lam"] == pytest.approx(bratu_load_of(1.0), abs=1e-10)
 
 
 def test_a_terminal_test_function_stops():
     stop = Event("UZ", "third", lambda trial: trial["lam"] - 1 / 3, terminal=True)
-    branch = follow(*bratu_start(), Settings(events=[stop]))
+    branch = trace(point_of(*bratu_start()), Settings(events=[stop]))
     assert branch.stop.reason == "event"
     assert abs(branch.points[-1]["lam"] - 1 / 3) < 1e-12
 
 
 def test_directions():
     system, x = bratu_start()
-    down = follow(system, x, Settings(direction=-1, limits={"lam": (-2, 4)}))
+    down = trace(point_of(system, x), Settings(direction=-1, limits={"lam": (-2, 4)}))
     assert down.points[-1]["lam"] == pytest.approx(-2, abs=1e-12)
     assert np.all(np.diff(down.column("lam")) < 0)
 
@@ -78,7 +80,7 @@ def test_closed_branch_is_recognised():
         lambda t, u, p: (0.0 * u.u,), lambda a, b, p: (a.u**2 + p.mu**2 - 1,), ["u"], {"mu": 0.0}
     )  # fmt: skip
     system = Collocation(problem, [0, 0.5, 1], 2, ["mu"], {})
-    branch = follow(system, system.pack(np.ones((5, 1)), {"mu": 0.0}), Settings(max_points=400))
+    branch = trace(point_of(system, system.pack(np.ones((5, 1)), {"mu": 0.0})), Settings(max_points=400))
     assert branch.stop.reason == "closed"
     assert [point["mu"] for point in branch.labelled("LP")] == pytest.approx([1.0, -1.0], abs=1e-12)
     assert branch.points[-1]["mu"] == pytest.approx(0, abs=1e-12)
@@ -89,7 +91,7 @@ def test_a_run_can_start_right_at_a_fold(branch):
     (fold,) = branch.labelled("LP")
     means = []
     for direction in (1, -1):
-        half = follow(fold.system, fold.x, Settings(direction=direction, limits={"lam": (3, 4)}))
+        half = trace(point_of(fold.system, fold.x), Settings(direction=direction, limits={"lam": (3, 4)}))
         assert half.points[-1]["lam"] == pytest.approx(3, abs=1e-10)
         means.append(half.points[-1]["mean"])
     passed = [point["mean"] for point in branch.labelled("UZ") if point.name == "lam = 3"]
@@ -112,7 +114,7 @@ def test_a_right_hand_side_that_is_nan_beyond_a_wall_stops_with_advice():
         lambda t, u, p: (math.sqrt(1.5 - p.mu) + 0 * u.u,), lambda a, b, p: (a.u,), ["u"], {"mu": 0.0}
     )
     system = Collocation(problem, [0, 1], 3, ["mu"], {})
-    branch = follow(system, system.pack(np.linspace(0, 1.2, 4)[:, None], {"mu": 0.0}))
+    branch = trace(point_of(system, system.pack(np.linspace(0, 1.2, 4)[:, None], {"mu": 0.0})))
     assert branch.stop.reason == "no convergence" and "min_step" in str(branch.stop)
     assert branch.points[-1].label == "MX"
     assert 1.4 < branch.points[-1]["mu"] <= 1.5

@@ -73,7 +73,7 @@ def test_sensitivity_and_fold_curve_in_odd_units():
     )  # fmt: skip
     branch = contin.trace(contin.solve(problem, [0, 0]), free=["q"], limits={"q": (0, 4e-9), "mean": (-1, 5)})
     (fold,) = branch.labelled("LP")
-    assert contin.sensitivities(fold)["f"]["q"] == pytest.approx(-fold["q"] / 1e9, rel=1e-9)
+    assert fold.sensitivities()["f"]["q"] == pytest.approx(-fold["q"] / 1e9, rel=1e-9)
     folds = contin.curve(fold, "f", limits={"f": (1e8, 1e10)})
     assert folds.stop.reason == "limit" and len(folds) < 60
     assert folds.column("q") * folds.column("f") == pytest.approx(np.full(len(folds), FOLD), rel=1e-11)

@@ -220,7 +220,7 @@ def test_folds_of_cycles_in_two_parameters():
         CycleProblem(field, ["x", "y"], {"mu": 0.5, "a": 1.0}), round_and_round(1.2), {"period": 6.0}, degree=6
     )
     (fold,) = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 0.6), "max_x": (0.5, 2)}, direction=-1).labelled("LP")
-    assert contin.sensitivities(fold)["a"]["mu"] == pytest.approx(-0.5, abs=1e-9)
+    assert fold.sensitivities()["a"]["mu"] == pytest.approx(-0.5, abs=1e-9)
     for point in contin.curve(fold, "a", limits={"a": (0.5, 2)}):
         assert point["mu"] == pytest.approx(-(point["a"] ** 2) / 4, abs=1e-9)
 

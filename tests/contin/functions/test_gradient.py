@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from contin import gradient
+from contin.lowlevel import gradient
 
 
 def test_gradient_is_symbolic():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contin import least, minimum
-from contin.lowlevel import Batch
+from contin.lowlevel import Batch, least, minimum
 
 
 def state(M, a):

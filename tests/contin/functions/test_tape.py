@@ -17,11 +17,11 @@ from scipy import special
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 import contin
-from contin import ProblemError, gradient, minimum, root
+from contin import ProblemError
 from contin.errors import InterpretedWarning
 from contin.functions.derivatives import jacobian, tangents
 from contin.functions.tape import Tape
-from contin.lowlevel import Batch
+from contin.lowlevel import Batch, gradient, minimum, root
 
 NONE = np.empty((0, 1))
 

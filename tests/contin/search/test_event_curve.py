@@ -13,7 +13,6 @@ from contin import (
     curve,
     load,
     save,
-    sensitivities,
     solve,
     trace,
 )
@@ -89,7 +88,7 @@ def test_what_is_held_is_no_word():
     problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
     run = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)})
     assert run.points[0].name == "start"
-    assert sensitivities(run.points[0])["b"]["a"] == pytest.approx(0, abs=1e-12)
+    assert run.points[0].sensitivities()["b"]["a"] == pytest.approx(0, abs=1e-12)
 
 
 @functools.cache

@@ -9,7 +9,7 @@ from bank import opt
 from bank.closed_forms import cusp, elastica
 from bank.gelfand import perturbed_gelfand
 
-from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, sensitivities, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, solve, trace
 
 
 def gelfand_branch(eps=0.2, highest=30.0, **options):
@@ -122,7 +122,7 @@ def test_branch_points_in_two_parameters():
     """The elastica on an elastic foundation, lam = pi^2 - k: the curve, its vanishing imperfection, and its slope."""
     start = solve(elastica(), [0, 0], intervals=12, degree=6)
     point = trace(start, free=["lam"], limits={"lam": (1, 20)}).labelled("BP")[0]
-    assert sensitivities(point)["k"]["lam"] == pytest.approx(-1, abs=1e-8)
+    assert point.sensitivities()["k"]["lam"] == pytest.approx(-1, abs=1e-8)
     for direction in (1, -1):
         found = curve(point, "k", direction=direction, limits={"k": (-5, 5)})
         assert found.points[-1]["k"] == pytest.approx(5 * direction, abs=1e-10)
@@ -137,10 +137,10 @@ def test_branch_points_in_two_parameters():
 def test_sensitivity_of_a_fold():
     """Of the cusp's, d/dlam of 2 (lam/3)^(3/2); of Gelfand's, against the difference of the folds at two values of eps."""
     fold = cusp_branch().labelled("LP")[0]
-    assert sensitivities(fold)["lam"]["mu"] == pytest.approx(3**-0.5, abs=1e-10)
+    assert fold.sensitivities()["lam"]["mu"] == pytest.approx(3**-0.5, abs=1e-10)
     fold, h = gelfand_folds()[0], 1e-4
     slope = (gelfand_folds(0.2 + h)[0]["lam"] - gelfand_folds(0.2 - h)[0]["lam"]) / (2 * h)
-    assert sensitivities(fold)["eps"]["lam"] == pytest.approx(slope, abs=1e-5)
+    assert fold.sensitivities()["eps"]["lam"] == pytest.approx(slope, abs=1e-5)
 
 
 def test_sensitivity_of_a_user_zero():
@@ -151,9 +151,9 @@ def test_sensitivity_of_a_user_zero():
 
     h, here = 1e-3, held(0.2)
     slope = (held(0.2 + h)["lam"] - held(0.2 - h)["lam"]) / (2 * h)
-    assert sensitivities(here)["eps"]["lam"] == pytest.approx(slope, abs=1e-6)
+    assert here.sensitivities()["eps"]["lam"] == pytest.approx(slope, abs=1e-6)
     with pytest.raises(ProblemError, match="'lam' must be one of"):
-        sensitivities(here, by=["lam"])
+        here.sensitivities(by=["lam"])
 
 
 BRUSSELATOR = AlgebraicProblem(
@@ -165,8 +165,8 @@ def test_sensitivity_of_a_hopf_point():
     """Of the Brusselator's at B = 1 + A^2."""
     branch = trace(solve(BRUSSELATOR, [1.5, 0.7]), free=["B"], limits={"B": (1, 5)})
     (hopf,) = branch.labelled("HB")
-    assert sensitivities(hopf)["A"]["B"] == pytest.approx(3.0, abs=1e-8)
-    assert sensitivities(branch.points[0])["A"]["B"] == pytest.approx(0, abs=1e-12)  # an end: the first free parameter is held
+    assert hopf.sensitivities()["A"]["B"] == pytest.approx(3.0, abs=1e-8)
+    assert branch.points[0].sensitivities()["A"]["B"] == pytest.approx(0, abs=1e-12)  # an end: the first free parameter is held
 
 
 def test_what_is_held_must_be_a_column():
@@ -174,10 +174,10 @@ def test_what_is_held_must_be_a_column():
         Event("UZ", "large", lambda trial: trial["y"] - 2)])  # fmt: skip
     (large,) = branch.labelled("UZ")  # y = B / A = 2
     with pytest.raises(ProblemError, match="held: must be given at a point UZ 'large'"):
-        sensitivities(large)
+        large.sensitivities()
     with pytest.raises(ProblemError, match="held: 'z' is no column of this problem"):
-        sensitivities(large, held="z")
-    assert sensitivities(large, held="y")["A"]["B"] == pytest.approx(2, abs=1e-8)
+        large.sensitivities(held="z")
+    assert large.sensitivities(held="y")["A"]["B"] == pytest.approx(2, abs=1e-8)
 
 
 def test_bad_starts():
@@ -194,14 +194,14 @@ def test_sensitivities_by_a_parameter_of_another_size(held):
     problem = AlgebraicProblem(lambda u, p: (u.x - p.a - 1e-6 * p.b,), ["x"], {"a": 1.0, "b": 3e6})
     branch = trace(solve(problem, [4.0]), free=["a"], limits={"a": (-3, 3)}, zeros={"x": [5.0]})
     (point,) = branch.labelled("UZ")
-    assert sensitivities(point, held=held)["b"]["a"] == pytest.approx(-1e-6, rel=1e-9)
+    assert point.sensitivities(held=held)["b"]["a"] == pytest.approx(-1e-6, rel=1e-9)
 
 
 def test_sensitivities_of_a_branch_point_by_a_parameter_of_another_size():
     """x (x - a + b / 1e6) has its branch point at a = b / 1e6."""
     problem = AlgebraicProblem(lambda u, p: (u.x * (u.x - p.a + 1e-6 * p.b),), ["x"], {"a": 1.0, "b": 3e6})
     (point,) = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, 5)}).labelled("BP")
-    assert sensitivities(point)["b"]["a"] == pytest.approx(1e-6, rel=1e-9)
+    assert point.sensitivities()["b"]["a"] == pytest.approx(1e-6, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["a = critical", "a = 0.231", "a", "x = -1.1", "b = 1"])

@@ -18,46 +18,13 @@ from contin.events.labelled import frequency_of
 from contin.problems.angles import winding_names
 from contin.problems.own_names import ROUNDS
 from contin.problems.statement import declared
-from contin.results.point import Point, system_of
+from contin.results.record import Record, system_of
 
 
 def sensitivities(
-    point: Point, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
+    point: Record, by: Sequence[str] | None, held: str | Callable[[Trial], float] | None
 ) -> dict[str, dict[str, float]]:
-    """Return the derivatives of the free parameters at a special point with respect to every other parameter.
-
-    Parameters
-    ----------
-    point : Point
-        A fold: the derivative of its primary parameter is -(w.F_mu) / (w.F_lambda), w the left null vector (one back-solve);
-        only that one is given. A branch point: of all free parameters, the point staying one (of the two branches that cross
-        on F + beta psi = 0 where the bifurcation is imperfect). Any other point: at a fixed value of ``held``.
-    by : sequence of str, optional
-        The other parameters; all that are not free by default.
-    held : str or callable, optional
-        For points that are neither, the quantity that stays fixed: a parameter, a functional, a state of an equilibrium, or
-        ``held(trial)``. By default it is the column that the point is about, the real part of the critical pair at a Hopf point
-        of an equilibrium, and at points of no special kind the first free parameter. At other special points it must be given.
-
-    Returns
-    -------
-    dict
-        ``result[mu][lambda]`` is dlambda/dmu.
-
-    Raises
-    ------
-    ProblemError
-        A name that is not a parameter that is held fixed on the branch; ``held`` is no column, or missing.
-
-    Examples
-    --------
-    >>> from contin import AlgebraicProblem, solve, trace
-    >>> cubic = AlgebraicProblem(lambda u, p: (p.a - p.b * u.x + u.x**3,), ["x"], {"a": 0.0, "b": 3.0})
-    >>> fold = trace(solve(cubic, [0.0]), free=["a"], limits={"a": (-3, 3)}).labelled("LP")[0]  # a = 2, x = 1
-    >>> {name: round(value["a"], 6) for name, value in sensitivities(fold).items()}
-    {'b': 1.0}
-    """
-    checks.instance("point", point, Point, "a Point")
+    """Return the derivatives of the free parameters at a special point; see `contin.Point.sensitivities`."""
     system = system_of(point, "point")
     others = [name for name in system.problem.parameters if name not in system.free]
     whole = (ROUNDS, *winding_names(declared(system.problem, "angles")))  # numbers of rounds, which cannot change a little
@@ -78,7 +45,7 @@ def sensitivities(
     return {name: _held(point, name, fixed) for name in by}
 
 
-def _fixed(point: Point, held: str | Callable[[Trial], float] | None) -> str | Callable[[Trial], float]:
+def _fixed(point: Record, held: str | Callable[[Trial], float] | None) -> str | Callable[[Trial], float]:
     """Return the quantity that stays fixed: a column, or a function of a trial.
 
     Raises
@@ -100,7 +67,7 @@ def _fixed(point: Point, held: str | Callable[[Trial], float] | None) -> str | C
     return held
 
 
-def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
+def _of_fold(point: Record, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return -(w.F_mu) / (w.F_lambda) for all mu at once."""
     system, primary = point.system, point.column
     unit = np.zeros(system.size)
@@ -114,21 +81,21 @@ def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[st
     return {name: {primary: float(-at[name] / at[primary])} for name in by}
 
 
-def _response(point: Point, column: Array) -> Array:
+def _response(point: Record, column: Array) -> Array:
     """Return the derivative of x by a parameter at a fixed place along the tangent, shape (size,), from that of F."""
     system = system_of(point, "point")
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
     return factors.solve(np.append(-column, 0.0))
 
 
-def _with(point: Point, name: str) -> tuple[System, Array, Array, float]:
+def _with(point: Record, name: str) -> tuple[System, Array, Array, float]:
     """Return the system with one more free parameter, x for it, the derivative of F by it as it is in x, and its size there."""
     system = system_of(point, "point")
     wide, x = system.with_free((*system.free, name), point.x)
     return wide, x, system.parameter_columns(point.x, (name,))[:, 0], float(wide.free_scales[-1])
 
 
-def _held(point: Point, name: str, held: str | Callable[[Trial], float]) -> dict[str, float]:
+def _held(point: Record, name: str, held: str | Callable[[Trial], float]) -> dict[str, float]:
     """Return the response, moved along the branch until the held quantity is what it was."""
     system, (wide, x, column, size) = system_of(point, "point"), _with(point, name)
     response = _response(point, column)
@@ -141,7 +108,7 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float]) -> dict
     return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))
 
 
-def _slope_of(point: Point, name: str, held: str | Callable[[Trial], float], v: Array, change: float) -> float:
+def _slope_of(point: Record, name: str, held: str | Callable[[Trial], float], v: Array, change: float) -> float:
     """Return the derivative of a quantity along v and a change of a parameter, by differences: it may be any function."""
     system = system_of(point, "point")
     value, linear = system.parameter(point.x, name), Linearization(point.tangent, np.nan)
@@ -154,7 +121,7 @@ def _slope_of(point: Point, name: str, held: str | Callable[[Trial], float], v: 
     return float(derivative(measured)[0])
 
 
-def _of_branch_point(point: Point, name: str) -> dict[str, float]:
+def _of_branch_point(point: Record, name: str) -> dict[str, float]:
     """Return the response with both g of the locating equations zero: a particular one, corrected along the kernel.
 
     Both g change by -w.F_xx v along the response and the parameter.
