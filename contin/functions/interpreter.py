@@ -34,7 +34,7 @@ from contin.functions.kernel_parts import (
     instruction,
     variable,
 )
-from contin.functions.primitives import TABLE
+from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, Program
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
@@ -224,10 +224,9 @@ def _arithmetic(builder: Any) -> dict[str, tuple[Callable[..., Any], int, int]]:
 
 def _library(builder: Any, name: str) -> tuple[Callable[..., Any], int]:
     """Return the value of a function of the C library for one lane, and the number of its operands."""
-    primitive = TABLE[name]
-    count = 2 if "y" in primitive.scalar.split("(", 1)[1] else 1
+    external, count = TABLE[name].external, 2 if name in OF_TWO else 1
     kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * count)
-    function = builder.module.globals.get(primitive.external) or ir.Function(builder.module, kind, primitive.external)
+    function = builder.module.globals.get(external) or ir.Function(builder.module, kind, external)
 
     def value(*given: Any) -> Any:
         found = builder.call(function, given)
@@ -318,30 +317,6 @@ def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: i
 
 # --- the rest of the kernel, and the kernel
 # -------------------------------------------------------------------------------------
-
-
-@helper
-def _polygamma(order, x):
-    """Return what `contin.functions.primitives.polygamma` returns."""
-    if (x <= 0 and x == math.floor(x)) or not math.isfinite(x):
-        return math.nan
-    sign = -1.0 if order % 2 == 0 else 1.0
-    total, factorial = 0.0, 1.0
-    for j in range(2, order + 1):
-        factorial *= j
-    while x < 15:
-        total += sign * factorial / x ** (order + 1)
-        x += 1
-    tail, power = 0.0, 1.0
-    for k in range(1, 8):
-        power /= x * x
-        rising = 1.0 / (2 * k) if order == 0 else 1.0
-        for j in range(1, order):
-            rising *= 2.0 * k + j
-        tail += BERNOULLI[k - 1] * rising * power
-    if order == 0:
-        return total + math.log(x) - 0.5 / x - tail
-    return total + sign * (factorial / order + factorial / (2 * x) + tail) / x**order
 
 
 @helper
@@ -558,7 +533,7 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
                 break
             if code[now, 0] == POLYGAMMA:
                 for lane in range(lanes):
-                    work[code[now, 1] * LANES + lane] = _polygamma(code[now, 3], work[code[now, 2] * LANES + lane])
+                    work[code[now, 1] * LANES + lane] = polygamma(code[now, 3], work[code[now, 2] * LANES + lane])
             elif code[now, 0] == TABLE_OF:
                 for lane in range(lanes):
                     work[code[now, 1] * LANES + lane] = _table(tables, code[now, 3], work[code[now, 2] * LANES + lane])
@@ -659,8 +634,6 @@ GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (factor - 2**64 for factor in round_off.FA
 SMALLEST_NORMAL = 2.2250738585072014e-308
 #: Codes of the operations that are written in Python.
 POLYGAMMA, TABLE_OF = CODES["polygamma"], CODES["table"]
-#: Bernoulli numbers B_2, B_4, ...
-BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
 #: Places that a search for unknowns tries, halved steps included. Damped steps on a convex function arrive in 5 to 20.
 EVALUATIONS = 200
 #: A step is not halved below this part of itself.

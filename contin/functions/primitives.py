@@ -1,10 +1,11 @@
-"""The operations of a tape: value, derivative and kernel code of each, side by side.
+"""The operations of a tape: value, derivative, kernel code and names of each, side by side.
 
-`TABLE` has a `Primitive` for every name. A rule of derivatives gets the operands and the result as recorded numbers and returns
-the derivative by each operand, recorded as well, so that derivatives have derivatives.
+`TABLE` has a `Primitive` for every name; where Python's ``math`` has the function, it is that name. A rule of derivatives gets
+the operands and the result as recorded numbers and returns the derivative by each operand, recorded as well, so that
+derivatives have derivatives.
 
-Kernel code is one of three kinds. ``vector`` names an instruction of `contin.functions.interpreter` for eight numbers at a
-time. ``scalar`` is the text of an expression of x (and y) for one number. Operations with neither are written out there.
+Functions with an ``external`` name are those of the C library in the kernel. The others are written out in
+`contin.functions.interpreter`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from contin.functions.kernel_parts import helper
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,12 @@ class Primitive:
     partials : callable
         ``partials(tape, data, operands, result)`` returns the derivative by each operand: a recorded number, a number, or None
         where it is zero everywhere.
-    scalar : str
-        Kernel code for one number.
     external : str
-        The C library's function that ``scalar`` calls.
+        The C library's function.
+    ufunc : str
+        Name of the universal function of NumPy or SciPy that records the operation.
+    pair : callable, optional
+        ``pair(apply, x, y)`` returns the real and the imaginary part of the function of x + i y; ``apply`` is that of the tape.
     constant : callable, optional
         ``evaluate`` where an operation of constants is carried out when it is recorded.
     simplify : callable, optional
@@ -44,8 +49,9 @@ class Primitive:
 
     evaluate: Callable[..., float]
     partials: Callable[..., Any]
-    scalar: str = ""
     external: str = ""
+    ufunc: str = ""
+    pair: Callable[..., tuple[Any, Any]] | None = None
     constant: Callable[..., float] | None = None
     simplify: Callable[..., int | None] | None = None
     commutes: bool = False
@@ -165,31 +171,35 @@ def _none(tape: Any, data: Any, operands: Any, result: Any) -> tuple[None, ...]:
 _OF_ERF = 2 / math.sqrt(math.pi)
 
 
+#: Bernoulli numbers B_2, B_4, ...
+BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
+
+
+@helper
 def polygamma(order: int, x: float) -> float:
     """Return the derivative of this order (0: itself) of the logarithmic derivative of the gamma function.
 
     Raised to 15 by recurrence, then the asymptotic series (DLMF 5.11.2, differentiated).
     """
-    if x <= 0 and x == math.floor(x):
+    if (x <= 0 and x == math.floor(x)) or not math.isfinite(x):
         return math.nan
-    if not math.isfinite(x):
-        return math.nan if x != math.inf else (math.inf if order == 0 else 0.0)
-    sign, total, factorial = (-1.0 if order % 2 == 0 else 1.0), 0.0, math.factorial(order)
+    sign = -1.0 if order % 2 == 0 else 1.0
+    total, factorial = 0.0, 1.0
+    for j in range(2, order + 1):
+        factorial *= j
     while x < 15:
         total += sign * factorial / x ** (order + 1)
         x += 1
-    bernoulli = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
+    tail, power = 0.0, 1.0
+    for k in range(1, 8):
+        power /= x * x
+        rising = 1.0 / (2 * k) if order == 0 else 1.0
+        for j in range(1, order):
+            rising *= 2.0 * k + j
+        tail += BERNOULLI[k - 1] * rising * power
     if order == 0:
-        tail = math.log(x) - 0.5 / x - sum(b / (2 * k * x ** (2 * k)) for k, b in enumerate(bernoulli, start=1))
-        return total + tail
-    tail = math.factorial(order - 1) / x**order + factorial / (2 * x ** (order + 1))
-    for k, b in enumerate(bernoulli, start=1):
-        tail += b * math.factorial(2 * k + order - 1) / (math.factorial(2 * k) * x ** (2 * k + order))
-    return total + sign * tail
-
-
-def _mod(x: Any, y: Any) -> Any:
-    return np.mod(x, y)
+        return total + math.log(x) - 0.5 / x - tail
+    return total + sign * (factorial / order + factorial / (2 * x) + tail) / x**order
 
 
 def _sum(data: Any, *operands: float) -> float:
@@ -223,95 +233,127 @@ def _of_table(tape: Any, data: Any, operands: Any, result: Any) -> Any:
     return (tape.apply("table", operands[0], data=data.derivative()),)
 
 
-def _primitive(numpy_function: Any, partials: Any, scalar: str = "", external: str = "", **more: Any) -> Primitive:
-    evaluate = _quiet(numpy_function)
-    return Primitive(evaluate, partials, scalar, external, constant=evaluate, **more)
+def _operation(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: Any) -> Primitive:
+    """Return an operation of numbers, carried out where all of them are constants."""
+    evaluate = _quiet(function)
+    return Primitive(evaluate, partials, external, constant=evaluate, **more)
 
 
-def _library(numpy_function: Any, name: str, derivative: Any) -> Primitive:
+def _ufunc(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: Any) -> Primitive:
+    """Return the operation of a universal function of NumPy, or of one of SciPy's by `_special`."""
+    return _operation(function, partials, external, ufunc=function.__name__, **more)
+
+
+def _library(
+    function: Callable[..., Any], name: str, derivative: Callable[..., Any], pair: Callable[..., tuple[Any, Any]] | None = None
+) -> Primitive:
     """Return a function of one number that the C library has."""
-    return _primitive(numpy_function, _one(derivative), f"{name}(x)", name)
+    return _ufunc(function, _one(derivative), name, pair=pair)
 
 
-def _special(name: str) -> Any:
-    def evaluate(x: Any) -> Any:
+def _special(name: str) -> Callable[..., Any]:
+    def evaluate(x: float) -> Any:
         from scipy import special  # type: ignore[import-untyped]
 
         return getattr(special, name)(x)
 
+    evaluate.__name__ = name
     return evaluate
+
+
+def _root_of_pair(apply: Callable[..., Any], x: Any, y: Any) -> tuple[Any, Any]:
+    """Return the root with the positive real part, written without cancellation on both sides of the imaginary axis."""
+    part = apply("sqrt", (apply("hypot", x, y) + abs(x)) / 2)
+    other, left = y / (2.0 * part), x < 0
+    sign = apply("select", y < 0, -1.0, 1.0)
+    return apply("select", left, abs(other), part), apply("select", left, sign * part, other)
+
+
+def _of_angle(y: Any, x: Any) -> tuple[Any, Any]:
+    square = x * x + y * y
+    return x / square, -y / square
 
 
 TABLE: dict[str, Primitive] = {
     "input": Primitive(lambda data: math.nan, _none),
     "constant": Primitive(lambda data: data, _none),
     # arithmetic
-    "add": _primitive(np.add, lambda *_: (1.0, 1.0), simplify=_simple_add, commutes=True),
-    "sub": _primitive(np.subtract, lambda *_: (1.0, -1.0), simplify=_simple_sub),
-    "mul": _primitive(np.multiply, lambda tape, data, xs, r: (xs[1], xs[0]), simplify=_simple_mul, commutes=True),
-    "div": _primitive(np.divide, lambda tape, data, xs, r: (1.0 / xs[1], -r / xs[1]), simplify=_simple_div),
-    "neg": _primitive(np.negative, lambda *_: (-1.0,), simplify=_simple_neg),
+    "add": _ufunc(np.add, lambda *_: (1.0, 1.0), simplify=_simple_add, commutes=True),
+    "sub": _ufunc(np.subtract, lambda *_: (1.0, -1.0), simplify=_simple_sub),
+    "mul": _ufunc(np.multiply, lambda tape, data, xs, r: (xs[1], xs[0]), simplify=_simple_mul, commutes=True),
+    "div": _ufunc(np.divide, lambda tape, data, xs, r: (1.0 / xs[1], -r / xs[1]), simplify=_simple_div),
+    "neg": _ufunc(np.negative, lambda *_: (-1.0,), simplify=_simple_neg),
     # n operands: their sum; a scalar product of two halves; a sum with constant factors
     "sum": Primitive(_sum, lambda tape, data, xs, r: (1.0,) * len(xs), constant=_sum),
     "dot": Primitive(_dot, _of_dot, constant=_dot),
     "linear": Primitive(_linear, lambda tape, data, xs, r: data, constant=_linear),
     # decisions
-    "lt": _primitive(np.less, _none),
-    "le": _primitive(np.less_equal, _none),
-    "eq": _primitive(np.equal, _none, commutes=True),
-    "select": _primitive(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
+    "lt": _ufunc(np.less, _none),
+    "le": _ufunc(np.less_equal, _none),
+    "eq": _ufunc(np.equal, _none, commutes=True),
+    "select": _operation(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
     # a product that is 0 where one of its factors is, also if the other one is nan or inf
-    "product": _primitive(
+    "product": _operation(
         lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_product, commutes=True, selects=True
     ),
-    "abs": _primitive(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
-    "sign": _primitive(np.sign, _none),
-    "floor": _primitive(np.floor, _none),
-    "ceil": _primitive(np.ceil, _none),
-    "trunc": _primitive(np.trunc, _none),
-    "rint": _primitive(np.rint, _none),
-    # functions
-    "sqrt": _primitive(np.sqrt, _one(lambda tape, x, r: 0.5 / r)),
-    "exp": _library(np.exp, "exp", lambda tape, x, r: r),
+    "abs": _ufunc(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
+    "sign": _ufunc(np.sign, _none),
+    "floor": _ufunc(np.floor, _none),
+    "ceil": _ufunc(np.ceil, _none),
+    "trunc": _ufunc(np.trunc, _none),
+    "rint": _ufunc(np.rint, _none),
+    # functions; those with a last entry are known of complex numbers too
+    "sqrt": _ufunc(np.sqrt, _one(lambda tape, x, r: 0.5 / r), pair=_root_of_pair),
+    "exp": _library(
+        np.exp, "exp", lambda tape, x, r: r,
+        lambda f, x, y: (f("exp", x) * f("cos", y), f("exp", x) * f("sin", y)),
+    ),
     "exp2": _library(np.exp2, "exp2", lambda tape, x, r: r * math.log(2)),
     "expm1": _library(np.expm1, "expm1", lambda tape, x, r: tape.apply("exp", x)),
-    "log": _library(np.log, "log", lambda tape, x, r: 1.0 / x),
+    "log": _library(
+        np.log, "log", lambda tape, x, r: 1.0 / x,
+        lambda f, x, y: (f("log", f("hypot", x, y)), f("atan2", y, x)),
+    ),
     "log1p": _library(np.log1p, "log1p", lambda tape, x, r: 1.0 / (1.0 + x)),
     "log2": _library(np.log2, "log2", lambda tape, x, r: (1 / math.log(2)) / x),
     "log10": _library(np.log10, "log10", lambda tape, x, r: (1 / math.log(10)) / x),
     "cbrt": _library(np.cbrt, "cbrt", lambda tape, x, r: 1.0 / (3.0 * r * r)),
-    "sin": _library(np.sin, "sin", lambda tape, x, r: tape.apply("cos", x)),
-    "cos": _library(np.cos, "cos", lambda tape, x, r: -tape.apply("sin", x)),
+    "sin": _library(
+        np.sin, "sin", lambda tape, x, r: tape.apply("cos", x),
+        lambda f, x, y: (f("sin", x) * f("cosh", y), f("cos", x) * f("sinh", y)),
+    ),
+    "cos": _library(
+        np.cos, "cos", lambda tape, x, r: -tape.apply("sin", x),
+        lambda f, x, y: (f("cos", x) * f("cosh", y), -f("sin", x) * f("sinh", y)),
+    ),
     "tan": _library(np.tan, "tan", lambda tape, x, r: 1.0 + r * r),
     "asin": _library(np.arcsin, "asin", lambda tape, x, r: 1.0 / tape.apply("sqrt", 1.0 - x * x)),
     "acos": _library(np.arccos, "acos", lambda tape, x, r: -1.0 / tape.apply("sqrt", 1.0 - x * x)),
     "atan": _library(np.arctan, "atan", lambda tape, x, r: 1.0 / (1.0 + x * x)),
-    "sinh": _library(np.sinh, "sinh", lambda tape, x, r: tape.apply("cosh", x)),
-    "cosh": _library(np.cosh, "cosh", lambda tape, x, r: tape.apply("sinh", x)),
+    "sinh": _library(
+        np.sinh, "sinh", lambda tape, x, r: tape.apply("cosh", x),
+        lambda f, x, y: (f("sinh", x) * f("cos", y), f("cosh", x) * f("sin", y)),
+    ),
+    "cosh": _library(
+        np.cosh, "cosh", lambda tape, x, r: tape.apply("sinh", x),
+        lambda f, x, y: (f("cosh", x) * f("cos", y), f("sinh", x) * f("sin", y)),
+    ),
     "tanh": _library(np.tanh, "tanh", lambda tape, x, r: 1.0 - r * r),
     "asinh": _library(np.arcsinh, "asinh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x + 1.0)),
     "acosh": _library(np.arccosh, "acosh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x - 1.0)),
     "atanh": _library(np.arctanh, "atanh", lambda tape, x, r: 1.0 / (1.0 - x * x)),
     "erf": _library(_special("erf"), "erf", lambda tape, x, r: _OF_ERF * tape.apply("exp", -(x * x))),
     "erfc": _library(_special("erfc"), "erfc", lambda tape, x, r: -_OF_ERF * tape.apply("exp", -(x * x))),
-    "gamma": _primitive(
-        _special("gamma"), _one(lambda tape, x, r: r * tape.apply("polygamma", x, data=0)), "tgamma(x)", "tgamma"
-    ),
-    "lgamma": _primitive(
-        _special("gammaln"), _one(lambda tape, x, r: tape.apply("polygamma", x, data=0)), "lgamma(x)", "lgamma"
-    ),
+    "gamma": _library(_special("gamma"), "tgamma", lambda tape, x, r: r * tape.apply("polygamma", x, data=0)),
+    "lgamma": _library(_special("gammaln"), "lgamma", lambda tape, x, r: tape.apply("polygamma", x, data=0)),
     "polygamma": Primitive(
         lambda data, x: polygamma(data, x),
         lambda tape, data, xs, r: (tape.apply("polygamma", xs[0], data=data + 1),),
     ),
-    "pow": _primitive(np.power, _of_pow, "pow(x, y)", "pow"),
-    "atan2": _primitive(
-        np.arctan2, lambda tape, data, xs, r: _of_angle(*xs), "atan2(x, y)", "atan2"
-    ),
-    "hypot": _primitive(np.hypot, lambda tape, data, xs, r: (xs[0] / r, xs[1] / r), "hypot(x, y)", "hypot"),
-    "mod": _primitive(
-        _mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "floored(fmod(x, y), y)", "fmod"
-    ),
+    "pow": _ufunc(np.power, _of_pow, "pow"),
+    "atan2": _ufunc(np.arctan2, lambda tape, data, xs, r: _of_angle(*xs), "atan2"),
+    "hypot": _ufunc(np.hypot, lambda tape, data, xs, r: (xs[0] / r, xs[1] / r), "hypot"),
+    "mod": _ufunc(np.mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "fmod"),
     # a piecewise polynomial; an unknown that is found by iteration; the first operand, as a minimum over such unknowns
     "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
     "root": Primitive(
@@ -323,8 +365,5 @@ TABLE: dict[str, Primitive] = {
         lambda tape, data, xs, r: [None, *data[0].slopes_of_least(tape, xs[1:])],
     ),
 }  # fmt: skip
-
-
-def _of_angle(y: Any, x: Any) -> tuple[Any, Any]:
-    square = x * x + y * y
-    return x / square, -y / square
+#: Functions of the C library of two numbers.
+OF_TWO = ("pow", "atan2", "hypot", "mod")

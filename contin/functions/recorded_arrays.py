@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from contin.functions.primitives import TABLE
 from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex, is_complex, part
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Tape, Unrecordable, power
@@ -170,53 +171,30 @@ def _power(a: Any, b: Any) -> Any:
     return power(b.tape.number(a), b) if isinstance(b, Number) else a**b
 
 
-def _not(a: Any) -> Any:
-    return select(a == 0, 1.0, 0.0)
+def _scaled(factor: float) -> Callable[[Any], Any]:
+    return lambda a: a * factor
 
 
-def _reciprocal(a: Any) -> Any:
-    return 1.0 / a
-
-
-def _floor_divide(a: Any, b: Any) -> Any:
-    return a // b
-
-
-#: Universal functions of NumPy by name: the function of numbers.
-UFUNCS: dict[str, Callable[..., Any]] = {
-    "add": lambda a, b: a + b, "subtract": lambda a, b: a - b, "multiply": lambda a, b: a * b, "divide": lambda a, b: a / b,
-    "true_divide": lambda a, b: a / b, "floor_divide": _floor_divide, "remainder": lambda a, b: a % b,
-    "mod": lambda a, b: a % b, "power": _power, "float_power": _power, "negative": lambda a: -a, "positive": lambda a: a,
-    "absolute": lambda a: abs(a), "fabs": lambda a: abs(a), "square": lambda a: a * a, "reciprocal": _reciprocal,
-    "maximum": largest, "fmax": largest, "minimum": smallest, "fmin": smallest, "less": lambda a, b: a < b,
-    "less_equal": lambda a, b: a <= b, "greater": lambda a, b: a > b, "greater_equal": lambda a, b: a >= b,
-    "equal": lambda a, b: a == b, "not_equal": lambda a, b: a != b, "logical_not": _not,
+#: Universal functions of NumPy and SciPy by name, as functions of numbers: those of the tape, and what is made of others.
+UFUNCS: dict[str, Callable[..., Any]] = {each.ufunc: operation(name) for name, each in TABLE.items() if each.ufunc}
+UFUNCS |= {
+    "add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv,
+    "floor_divide": operator.floordiv, "remainder": operator.mod, "power": _power, "float_power": _power,
+    "negative": operator.neg, "positive": operator.pos, "absolute": abs, "fabs": abs, "square": lambda a: a * a,
+    "reciprocal": lambda a: 1.0 / a, "maximum": largest, "fmax": largest, "minimum": smallest, "fmin": smallest,
+    "less": operator.lt, "less_equal": operator.le, "greater": operator.gt, "greater_equal": operator.ge,
+    "equal": operator.eq, "not_equal": operator.ne, "logical_not": lambda a: select(a == 0, 1.0, 0.0),
     "logical_and": lambda a, b: select(a, select(b, 1.0, 0.0), 0.0),
     "logical_or": lambda a, b: select(a, 1.0, select(b, 1.0, 0.0)),
-    "bitwise_and": lambda a, b: a & b, "bitwise_or": lambda a, b: a | b, "invert": lambda a: ~a,
+    "bitwise_and": operator.and_, "bitwise_or": operator.or_, "invert": operator.invert,
     "conjugate": lambda a: part(a, "conjugate"),
     "heaviside": lambda a, b: select(a < 0, 0.0, select(a == 0, b, 1.0)), "clip": lambda a, low, high: clip(a, low, high),
-    "deg2rad": lambda a: a * (math.pi / 180), "radians": lambda a: a * (math.pi / 180),
-    "rad2deg": lambda a: a * (180 / math.pi), "degrees": lambda a: a * (180 / math.pi),
+    "deg2rad": _scaled(math.pi / 180), "radians": _scaled(math.pi / 180),
+    "rad2deg": _scaled(180 / math.pi), "degrees": _scaled(180 / math.pi),
     "isfinite": lambda a: abs(a) < math.inf, "isnan": lambda a: a != a,
     "logaddexp": lambda a, b: largest(a, b) + operation("log1p")(operation("exp")(-abs(a - b))),
+    "psi": lambda a: a.tape.apply("polygamma", a, data=0), "expit": lambda a: 1.0 / (1.0 + operation("exp")(-a)),
 }  # fmt: skip
-#: NumPy's names of operations, where they differ from the tape's.
-_RENAMED = {
-    "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arcsinh": "asinh", "arccosh": "acosh", "arctanh": "atanh",
-    "arctan2": "atan2",
-}  # fmt: skip
-_SAME = (
-    "sqrt", "exp", "exp2", "expm1", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "sinh", "cosh", "tanh",
-    "hypot",
-    "sign", "floor", "ceil", "trunc", "rint", "erf", "erfc", "gamma",
-)  # fmt: skip
-UFUNCS |= {name: operation(name) for name in _SAME} | {name: operation(own) for name, own in _RENAMED.items()}
-UFUNCS |= {
-    "gammaln": operation("lgamma"),
-    "psi": lambda a: a.tape.apply("polygamma", a, data=0),
-    "expit": lambda a: 1.0 / (1.0 + operation("exp")(-a)),
-}
 
 
 def clip(a: Any, low: Any = None, high: Any = None) -> Any:

@@ -11,10 +11,12 @@ import cmath
 import functools
 import math
 import types
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import (
     FUNCTIONS,
     UFUNCS,
@@ -29,11 +31,10 @@ from contin.functions.recorded_arrays import (
     smallest,
     tabulated,
 )
-from contin.functions.recorded_complex import FUNCTIONS as COMPLEX
-from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex
+from contin.functions.recorded_complex import COMPLEX, ComplexNumber, complex_number, function_of_complex
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.tables import Table
-from contin.functions.tape import Number, Unrecordable, power
+from contin.functions.tape import Number, Unrecordable
 
 
 def prepared(function: Any) -> Any:
@@ -263,11 +264,6 @@ def _for_all(original: Any, function: Any) -> Any:
     return _Either()
 
 
-def _of_math(name: str) -> Any:
-    own, original = operation(_RENAMED.get(name, name)), getattr(math, name)
-    return lambda *inputs: original(*inputs) if recorded(*inputs) is None else own(*inputs)
-
-
 def _unless_recorded(original: Any, function: Any) -> Any:
     return lambda *inputs: original(*inputs) if recorded(*inputs) is None else function(*inputs)
 
@@ -307,62 +303,40 @@ def _maker(original: Any) -> Any:
     return make
 
 
-class _FloatKind(type):
-    """The class of `_Float`: a recorded number is a float."""
+class _Kind(type):
+    """The class of the stand-ins of ``float`` and ``complex``: recorded numbers are among their ``kinds``."""
 
-    def __call__(cls, value: Any = 0.0) -> Any:
-        return value if recorded(value) is not None else float(value)
+    kinds: tuple[type, ...]
+    of: Callable[..., Any]
 
-    def __instancecheck__(cls, value: Any) -> bool:
-        return isinstance(value, (float, Number))
+    def __call__(cls, *values: Any) -> Any:
+        return cls.of(*values)
 
-
-class _Float(metaclass=_FloatKind):
-    """The stand-in of ``float``: a recorded number stays what it is."""
-
-
-class _ComplexKind(type):
-    """The class of `_Complex`."""
-
-    def __call__(cls, real: Any = 0.0, imag: Any = 0.0) -> Any:
-        return complex(real, imag) if recorded(real, imag) is None else real + 1j * imag
-
-    def __instancecheck__(cls, value: Any) -> bool:
-        return isinstance(value, (complex, ComplexNumber))
+    def __instancecheck__(cls, value: object) -> bool:
+        return isinstance(value, cls.kinds)
 
 
-class _Complex(metaclass=_ComplexKind):
-    """The stand-in of ``complex``."""
+class _Float(metaclass=_Kind):
+    kinds = float, Number
+    of = staticmethod(lambda value=0.0: value if recorded(value) is not None else float(value))
 
 
-def _of_cmath(name: str) -> Any:
-    original = getattr(cmath, name)
-    return lambda z: original(z) if recorded(z) is None else function_of_complex(name, complex_number(recorded(z).tape, z))  # type: ignore[union-attr]
+class _Complex(metaclass=_Kind):
+    kinds = complex, ComplexNumber
+    of = staticmethod(lambda x=0.0, y=0.0: complex(x, y) if recorded(x, y) is None else x + 1j * y)
 
 
-def _ldexp(x: Any, n: Any) -> Any:
-    return x * 2.0**n
+def _of_complex(name: str) -> Callable[[Any], Any]:
+    return lambda z: function_of_complex(name, complex_number(z.tape, z))
 
 
 def _copysign(x: Any, y: Any) -> Any:
     return abs(x) * operation("sign")(operation("sign")(y) + 0.5)
 
 
-def _pow_of_math(x: Any, y: Any) -> Any:
-    return power(x, y) if isinstance(x, Number) else x**y
-
-
-def _distance(p: Any, q: Any) -> Any:
+def _distance(p: Sequence[Any], q: Sequence[Any]) -> Any:
     difference = [a - b for a, b in zip(p, q)]
     return operation("sqrt")(scalar_product(difference, difference))
-
-
-#: Functions of ``math`` under the same name on the tape, or under another one.
-_RENAMED = {"fabs": "abs"}
-_OF_MATH = (
-    "sqrt", "exp", "exp2", "expm1", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh",
-    "cosh", "tanh", "asinh", "acosh", "atanh", "atan2", "erf", "erfc", "gamma", "lgamma", "fabs", "floor", "ceil", "trunc",
-)  # fmt: skip
 
 
 def _log(x: Any, base: Any = math.e) -> Any:
@@ -373,24 +347,22 @@ def _hypot(*values: Any) -> Any:
     return operation("hypot")(*values) if len(values) == 2 else operation("sqrt")(scalar_product(values, values))
 
 
+#: Functions of recorded numbers by the functions that they stand for: operations under their own names, and others.
+_OF_NUMBERS: dict[Any, Callable[..., Any]] = {getattr(math, name): operation(name) for name in TABLE if hasattr(math, name)}
+_OF_NUMBERS |= {
+    math.log: _log, math.hypot: _hypot, math.pow: UFUNCS["power"], math.copysign: _copysign, math.fabs: abs,
+    math.radians: UFUNCS["radians"], math.degrees: UFUNCS["degrees"], math.ldexp: lambda x, n: x * 2.0**n,
+    math.isfinite: UFUNCS["isfinite"], math.isnan: UFUNCS["isnan"], math.dist: _distance,
+    math.fmod: lambda x, y: x - y * operation("trunc")(x / y), cmath.phase: FUNCTIONS[np.angle],
+    cmath.rect: lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi)),
+}  # fmt: skip
+_OF_NUMBERS |= {getattr(cmath, name): _of_complex(name) for name in COMPLEX}
 #: What stands for functions that take ordinary numbers only.
-_STAND_INS: dict[Any, Any] = {getattr(math, name): _of_math(name) for name in _OF_MATH if hasattr(math, name)}
+_STAND_INS: dict[Any, Any] = {original: _unless_recorded(original, own) for original, own in _OF_NUMBERS.items()}
 _STAND_INS |= {
-    math.log: _unless_recorded(math.log, _log), math.hypot: _unless_recorded(math.hypot, _hypot),
-    math.pow: _unless_recorded(math.pow, _pow_of_math), math.copysign: _unless_recorded(math.copysign, _copysign),
-    math.radians: _unless_recorded(math.radians, lambda x: x * (math.pi / 180)),
-    math.ldexp: _unless_recorded(math.ldexp, _ldexp),
-    math.degrees: _unless_recorded(math.degrees, lambda x: x * (180 / math.pi)),
-    math.isfinite: _unless_recorded(math.isfinite, lambda x: abs(x) < math.inf),
-    math.isnan: _unless_recorded(math.isnan, lambda x: x != x),
-    math.fmod: _unless_recorded(math.fmod, lambda x, y: x - y * operation("trunc")(x / y)),
-    math.dist: _unless_recorded(math.dist, _distance),
     max: _most(largest, max), min: _most(smallest, min),
     float: _Float, np.float64: _Float, complex: _Complex, np.complex128: _Complex,
-    cmath.phase: _unless_recorded(cmath.phase, FUNCTIONS[np.angle]),
-    cmath.rect: _unless_recorded(cmath.rect, lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi))),
 }  # fmt: skip
-_STAND_INS |= {getattr(cmath, name): _of_cmath(name) for name in COMPLEX if hasattr(cmath, name)}
 _STAND_INS |= {
     each: _maker(each)
     for each in (

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -233,13 +234,23 @@ class Tape:
 
     def lines(self, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
         """Return operations as lines of text, with ``labels`` of inputs by place; what is used once stands where it is used."""
-        return _Printer(self, places, labels).lines()
+        return _lines(self, places, labels)
 
     def _unknown(self, operation: Operation, values: Mapping[Any, float]) -> float:
         """Return an unknown that is found by iteration."""
         search, index = operation.data
         found: float = search.newton(self, values)[index]
         return found
+
+
+def _binary(name: str) -> Any:
+    """Return the method of Python's arithmetic that appends an operation."""
+    return lambda self, other: self._with(name, self, other)
+
+
+def _swapped(name: str) -> Any:
+    """Return that of the other operand's side."""
+    return lambda self, other: self._with(name, other, self)
 
 
 class Number:
@@ -278,46 +289,29 @@ class Number:
         return self
 
     def _with(self, name: str, *operands: Any) -> Any:
-        if all(_is_scalar(operand) for operand in operands):
+        if all(isinstance(operand, _SCALARS) or _is_scalar(operand) for operand in operands):
             return self.tape.apply(name, *operands)
         if any(isinstance(operand, (complex, np.complexfloating)) for operand in operands):
             return self._arrays.complex_operation(name, *operands)
         return NotImplemented
 
-    def __add__(self, other: Any) -> Any:
-        return self._with("add", self, other)
+    __add__, __radd__ = _binary("add"), _swapped("add")
+    __sub__, __rsub__ = _binary("sub"), _swapped("sub")
+    __mul__, __rmul__ = _binary("mul"), _swapped("mul")
+    __truediv__, __rtruediv__ = _binary("div"), _swapped("div")
+    __mod__, __rmod__ = _binary("mod"), _swapped("mod")
+    __lt__, __gt__ = _binary("lt"), _swapped("lt")
+    __le__, __ge__ = _binary("le"), _swapped("le")
+    __eq__ = _binary("eq")
 
-    def __radd__(self, other: Any) -> Any:
-        return self._with("add", other, self)
+    def __ne__(self, other: object) -> Any:
+        equal = self._with("eq", self, other)
+        return equal if equal is NotImplemented else 1.0 - equal
 
-    def __sub__(self, other: Any) -> Any:
-        return self._with("sub", self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self._with("sub", other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return self._with("mul", self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self._with("mul", other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self._with("div", self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self._with("div", other, self)
-
-    def __mod__(self, other: Any) -> Any:
-        return self._with("mod", self, other)
-
-    def __rmod__(self, other: Any) -> Any:
-        return self._with("mod", other, self)
-
-    def __floordiv__(self, other: Any) -> Any:
+    def __floordiv__(self, other: object) -> Any:
         return _floor_of(self._with("div", self, other))
 
-    def __rfloordiv__(self, other: Any) -> Any:
+    def __rfloordiv__(self, other: object) -> Any:
         return _floor_of(self._with("div", other, self))
 
     def __pow__(self, other: Any) -> Any:
@@ -334,25 +328,6 @@ class Number:
 
     def __abs__(self) -> Number:
         return self.tape.apply("abs", self)
-
-    def __lt__(self, other: Any) -> Any:
-        return self._with("lt", self, other)
-
-    def __gt__(self, other: Any) -> Any:
-        return self._with("lt", other, self)
-
-    def __le__(self, other: Any) -> Any:
-        return self._with("le", self, other)
-
-    def __ge__(self, other: Any) -> Any:
-        return self._with("le", other, self)
-
-    def __eq__(self, other: Any) -> Any:
-        return self._with("eq", self, other)
-
-    def __ne__(self, other: Any) -> Any:
-        equal = self._with("eq", self, other)
-        return equal if equal is NotImplemented else 1.0 - equal
 
     def __invert__(self) -> Any:
         return self.tape.apply("eq", self, 0.0)
@@ -398,8 +373,12 @@ class Number:
         return self.tape.arrays
 
 
-def _is_scalar(value: Any) -> bool:
-    return isinstance(value, (Number, numbers.Real, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+#: What most operands are, asked first: to ask whether something is a real number of any kind takes ten times as long.
+_SCALARS = (Number, float, int)
+
+
+def _is_scalar(value: object) -> bool:
+    return isinstance(value, (*_SCALARS, numbers.Real, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0)
 
 
 def _floor_of(value: Any) -> Any:
@@ -412,7 +391,7 @@ def _truth(tape: Tape, value: Any) -> Number:
 
 
 #: Largest whole power that is written as products. Larger ones use the library's function.
-_LARGEST_POWER = 64
+LARGEST_POWER = 64
 
 
 def power(base: Number, exponent: Any) -> Number:
@@ -423,88 +402,70 @@ def power(base: Number, exponent: Any) -> Number:
         return tape.apply("pow", base, exponent)
     if known == 0.5:
         return tape.apply("sqrt", base)
-    if known == math.floor(known) and abs(known) <= _LARGEST_POWER:
-        result = _whole_power(base, int(abs(known)))
-        return result if known >= 0 else 1.0 / result
+    if known == math.floor(known) and abs(known) <= LARGEST_POWER:
+        found: Number = whole_power(tape.number(1.0), base, int(known))
+        return found
     return tape.apply("pow", base, known)
 
 
-def _whole_power(base: Number, exponent: int) -> Number:
-    """Return a product of squares."""
-    result, square = base.tape.number(1.0), base
-    while exponent:
-        if exponent & 1:
+def whole_power(one: Any, base: Any, exponent: int) -> Any:
+    """Return a power as a product of squares, of numbers with this ``one``."""
+    result, square, left = one, base, abs(exponent)
+    while left:
+        if left & 1:
             result = result * square
-        exponent >>= 1
-        if exponent:
+        left >>= 1
+        if left:
             square = square * square
-    return result
+    return result if exponent >= 0 else one / result
 
 
 #: Operations that are written with a sign between their operands, and how tightly it binds.
-_SIGNS = {
-    "add": (" + ", 1),
-    "sub": (" - ", 1),
-    "mul": (" * ", 2),
-    "div": (" / ", 2),
-    "lt": (" < ", 0),
-    "le": (" <= ", 0),
-    "eq": (" == ", 0),
-}
-#: The binding of a negative sign and of names.
-_NEGATIVE, _NAME = 1, 9
+_SIGNS = {"add": ("+", 1), "sub": ("-", 1), "mul": ("*", 2), "div": ("/", 2), "lt": ("<", 0), "le": ("<=", 0), "eq": ("==", 0)}
+#: The binding of names.
+_NAME = 9
+#: A text, and how tightly it binds.
+_Text = tuple[str, int]
 
 
-class _Printer:
-    """The text of operations."""
+def _lines(tape: Tape, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
+    """Return a line for what is used several times, and for each result; see `Tape.lines`."""
+    needed, found = tape.needed(places), list[str]()
+    uses = Counter(operand for place in needed for operand in tape.operations[place].operands)
+    texts: dict[int, _Text] = {place: (label, _NAME) for place, label in labels.items()}
+    for place in needed:
+        if place in texts:
+            continue
+        operation = tape.operations[place]
+        texts[place] = _text(operation, [texts[operand] for operand in operation.operands])
+        if uses[place] > 1 and operation.name != "constant":
+            found.append(f"z{len(found) + 1} = {texts[place][0]}")
+            texts[place] = f"z{len(found)}", _NAME
+    return found + [texts[place][0] for place in places]
 
-    def __init__(self, tape: Tape, places: Sequence[int], labels: Mapping[int, str]) -> None:
-        self.tape, self.places = tape, places
-        self.uses: dict[int, int] = {}
-        self.needed = tape.needed(places)
-        for place in self.needed:
-            for operand in tape.operations[place].operands:
-                self.uses[operand] = self.uses.get(operand, 0) + 1
-        self.texts: dict[int, tuple[str, int]] = {place: (label, _NAME) for place, label in labels.items()}
 
-    def lines(self) -> list[str]:
-        """Return a line for what is used several times, and for each result."""
-        found: list[str] = []
-        for place in self.needed:
-            if place in self.texts:
-                continue
-            text = self._text(self.tape.operations[place])
-            if self.uses.get(place, 0) > 1 and self.tape.operations[place].name != "constant":
-                name = f"z{len(found) + 1}"
-                found.append(f"{name} = {text[0]}")
-                text = name, _NAME
-            self.texts[place] = text
-        return found + [self.texts[place][0] for place in self.places]
-
-    def _text(self, operation: Operation) -> tuple[str, int]:
-        name, operands = operation.name, [self.texts[operand] for operand in operation.operands]
-        if name == "constant":
-            return _shortest(operation.data), _NAME if operation.data >= 0 else _NEGATIVE
-        if name in _SIGNS:
-            sign, binds = _SIGNS[name]
-            right = binds + (name in ("sub", "div"))
-            return sign.join([_within(operands[0], binds), _within(operands[1], right)]), binds
-        if name == "neg":
-            return f"-{_within(operands[0], _NEGATIVE + 1)}", _NEGATIVE
-        if name == "select":
-            condition, a, b = (text for text, _ in operands)
-            return f"({a} if {condition} else {b})", _NAME
-        if name in ("sum", "dot", "linear"):
-            half = len(operands) // 2
-            given: Any = zip(operands[:half], operands[half:]) if name == "dot" else [(each,) for each in operands]
-            if name == "linear":
-                given = [((f"{factor:.17g}", _NAME), *each) for factor, each in zip(operation.data, given)]
-            return " + ".join(" * ".join(_within(factor, 2) for factor in term) for term in given), 1
-        if name == "root":
-            search, index = operation.data
-            return f"{'argmin' if search.minimum else 'root'}{min(search.unknowns)}[{index}]", _NAME
-        inside = ", ".join(text for text, _ in operands)
-        return f"{name}({inside})", _NAME
+def _text(operation: Operation, operands: list[_Text]) -> _Text:
+    """Return the text of an operation, of those of its operands."""
+    name, data = operation.name, operation.data
+    plain = [text for text, _ in operands]
+    if name == "constant":
+        return _shortest(data), _NAME if data >= 0 else 1
+    if name in _SIGNS:
+        sign, binds = _SIGNS[name]
+        return f"{_within(operands[0], binds)} {sign} {_within(operands[1], binds + (name in ('sub', 'div')))}", binds
+    if name == "neg":
+        return f"-{_within(operands[0], 2)}", 1
+    if name == "select":
+        return f"({plain[1]} if {plain[0]} else {plain[2]})", _NAME
+    if name in ("sum", "dot", "linear"):
+        half = len(operands) // 2
+        factors = {"sum": [], "dot": operands[:half], "linear": [(f"{factor:.17g}", _NAME) for factor in data or ()]}[name]
+        terms = zip(factors, operands[half:] if name == "dot" else operands) if factors else zip(operands)
+        return " + ".join(" * ".join(_within(each, 2) for each in term) for term in terms), 1
+    if name == "root":
+        search, index = data
+        return f"{'argmin' if search.minimum else 'root'}{min(search.unknowns)}[{index}]", _NAME
+    return f"{name}({', '.join(plain)})", _NAME
 
 
 def _shortest(value: float) -> str:
@@ -512,6 +473,6 @@ def _shortest(value: float) -> str:
     return next(text for text in (f"{value:.15g}", f"{value:.16g}", f"{value:.17g}") if float(text) == value or text[-1] == "n")
 
 
-def _within(text: tuple[str, int], binds: int) -> str:
+def _within(text: _Text, binds: int) -> str:
     """Return a text, in brackets where it binds less tightly."""
     return text[0] if text[1] >= binds else f"({text[0]})"
