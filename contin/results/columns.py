@@ -90,12 +90,13 @@ def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
     rows, places = head["points"], [head["names"].index(name) for name in head["free"]]
     values = np.array([_parameters(head, row, arrays, number, places) for number, row in enumerate(rows)])
     columns = {"arclength": np.array([row["arclength"] for row in rows])}
-    if any("discretization_error" in row for row in rows):
-        columns["discretization_error"] = np.array([row.get("discretization_error", np.nan) for row in rows])
+    errors = np.array([row["discretization_error"] for row in rows])
+    if not np.isnan(errors).all():
+        columns["discretization_error"] = errors
     columns |= dict(zip(head["names"], values.T))
     columns |= {name: np.array([row["functionals"][name] for row in rows]) for name in rows[0]["functionals"]}
-    if any(row.get("index") is not None for row in rows):
-        columns["index"] = np.array([-1 if row.get("index") is None else row["index"] for row in rows], dtype=float)
+    if any(row["index"] is not None for row in rows):
+        columns["index"] = np.array([-1 if row["index"] is None else row["index"] for row in rows], dtype=float)
     return StoredColumns(
         columns, [row["label"] for row in rows], [row["name"] for row in rows], tuple(head["free"]),
         " ".join(filter(None, (head["stop"] or ())[1:])), tuple(head["states"]),
@@ -106,7 +107,7 @@ def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
 def _solution(head: dict[str, Any], arrays: dict[str, Array], number: int) -> Array:
     """Return the unknowns of a point without those that a curve in two parameters adds."""
     x: Array = arrays[f"x{number}"]
-    return x[: len(x) - head.get("further", 0)]
+    return x[: len(x) - head["further"]]
 
 
 def _parameters(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Array], number: int, places: list[int]) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,14 +14,13 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
-from contin.boundary.system import Collocation
 from contin.core.protocol import Discretization
 from contin.core.scales import Scales
 from contin.core.state import Stop
+from contin.core.system import System
 from contin.defining.branch_point_curve import BranchPointCurve
 from contin.defining.fold_curve import FoldCurve
 from contin.equilibria.statement import AlgebraicProblem
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint
 from contin.events.labelled import finding_of
@@ -33,8 +32,15 @@ from contin.results.point import Point
 
 Result = TypeVar("Result")
 
-#: First entry of every file, and of a curve in two parameters: another number where an older version could not read it.
-_FORMAT, _OF_CURVE = "contin branch 1", "contin branch 2"
+#: First entry of every file, of today and of version 0.2.
+_FORMAT, _OF_VERSION_2 = "contin branch 3", "contin branch 1"
+#: Fields of a point that are stored as they are.
+_FIELDS = (
+    "label", "name", "arclength", "iterations", "newton_error", "discretization_error", "errors", "functionals", "index",
+    "nullity", "index_change", "breaks", "column", "value",
+)  # fmt: skip
+#: Modules of the kinds of problems begin with this.
+_PACKAGE = __name__.partition(".")[0] + "."
 #: Arrays of a branch point that are stored besides its tangents.
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
@@ -76,39 +82,36 @@ def save(branch: Branch, path: str | Path) -> None:
             arrays |= _arrays_of(point.system, at)
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
         arrays |= {f"{name}{number}": array for name, array in finding_of(point.details).arrays.items()}
-        rows.append(_row(point, at))
+        fields = {name: getattr(point, name) for name in _FIELDS}
+        rows.append({"system": at, **fields, **finding_of(point.details).numbers, "details": _numbers(point.details)})
     first: Any = branch.points[0].system
-    curves = [[system.kind, system.kappa_size] for system in systems if system.on_curve]
-    further = first.size - first.base.size if first.on_curve else 0  # unknowns that a curve adds
-    stop = branch.stop and [str(branch.stop.reason), branch.stop.message, branch.stop.advice]
     head = {
-        "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
-        "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),
-        "symmetry": _symmetry(first.solution.problem), "notes": list(branch.notes),
+        "format": _FORMAT, "points": rows, "notes": list(branch.notes),
+        "stop": branch.stop and [str(branch.stop.reason), branch.stop.message, branch.stop.advice],
+        "free": first.free, "degrees": [system.degree for system in systems], **_statement(first.solution.problem),
+        "curves": [[system.kind, system.kappa_size] for system in systems if system.on_curve],
+        "further": first.size - first.base.size if first.on_curve else 0,  # unknowns that a curve adds
     }  # fmt: skip
-    if curves:
-        head |= {"curves": curves, "further": further, "symmetric": head["symmetry"] is not None}
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
     write_whole(path, image.getvalue())
 
 
-def _symmetry(problem: Any) -> list[list[float]] | None:
-    """Return the matrix of the symmetry of cycles; None where none is declared."""
-    return problem.symmetry.tolist() if declared(problem, "order") > 1 else None
-
-
-def _row(point: Point, at: int) -> dict[str, Any]:
-    """Return what is stored of a point besides arrays; ``at`` is the number of its system."""
+def _statement(problem: BoundaryValueProblem | AlgebraicProblem) -> dict[str, Any]:
+    """Return by what a problem is known again: kind, names, and the matrix of a symmetry (None where none is declared)."""
+    kinds = (kind.__name__ for kind in type(problem).__mro__ if kind.__module__.startswith(_PACKAGE))
+    symmetry: Any = getattr(problem, "symmetry") if declared(problem, "order") > 1 else None  # noqa: B009
     return {
-        "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
-        "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
-        "discretization_error": point.discretization_error,
-        "errors": dict(point.errors), "imperfection": None, "dimension": None, "continuum": False, "spread": 0.0,
-        **finding_of(point.details).numbers,
-        "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
-        "details": _numbers(point.details), "column": point.column, "value": point.value,
+        "kind": next(kinds), "states": list(problem.state_names), "names": list(problem.parameters),
+        "symmetry": symmetry if symmetry is None else symmetry.tolist(),
     }  # fmt: skip
+
+
+def _said(statement: dict[str, Any]) -> str:
+    """Return what `_statement` returns as problems are printed."""
+    kind = "a problem " if statement["kind"] == _UNTOLD else statement["kind"]
+    symmetry = "" if statement["symmetry"] in (None, _UNTOLD) else f"; symmetry {statement['symmetry']}"
+    return f"{kind}(states {checks.listed(statement['states'])}; parameters {checks.listed(statement['names'])}{symmetry})"
 
 
 def _arrays_of(system: Any, number: int) -> dict[str, Array]:
@@ -165,14 +168,12 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
-        if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
-            raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
-        told = "symmetric" in head or not head.get("curves")  # version 0.2 did not tell it of curves
-        if told and head.get("symmetry") != _symmetry(problem):
-            raise ProblemError(f"{str(path)!r} is of a problem with the symmetry {head.get('symmetry')}")
+        own = _statement(problem)
+        if any(head[name] not in (own[name], _UNTOLD) for name in own):
+            raise ProblemError(f"{str(path)!r} is of another problem: {_said(head)}, not {_said(own)}")
         systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
-        return Branch(points, Stop(*head["stop"]) if head["stop"] else None, list(head.get("notes", [])))
+        return Branch(points, Stop(*head["stop"]) if head["stop"] else None, head["notes"])
 
     return contents(path, branch)
 
@@ -191,79 +192,59 @@ def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]]
         pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
     try:
         with np.load(path, allow_pickle=False) as file:
-            head = json.loads(file["head"].tobytes())
-            if head["format"] not in (_FORMAT, _OF_CURVE):
-                raise KeyError("format")
-            return make(head, {name: file[name] for name in file.files})
+            return make(_head(json.loads(file["head"].tobytes())), {name: file[name] for name in file.files})
     except ProblemError:
         raise
     except Exception as error:  # zip, zlib, json, numpy, and memory have many ways to say that a file is damaged
         raise ProblemError(f"{str(path)!r} is no branch stored by contin, or damaged") from error
 
 
-def _system(
-    problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
-) -> Discretization:
-    base = _base(problem, head, arrays, i)
-    if not head.get("curves"):
-        return base
-    kind, size = head["curves"][i]
-    found: Discretization = _curves(base)[kind].of_size(base, size)
-    return found
+#: What a file does not tell.
+_UNTOLD = "untold"
 
 
-def _base(
-    problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
-) -> Collocation | Algebraic:
+def _head(stored: dict[str, Any]) -> dict[str, Any]:
+    """Return the head of a file as it is written today.
+
+    Version 0.2 told the column that a point is about by its name, and of values the first digits only, which are left out.
+    """
+    if stored["format"] == _FORMAT:
+        return stored
+    if stored["format"] != _OF_VERSION_2:
+        raise KeyError("format")
+    untold = {"value": None, "discretization_error": math.nan, "column": ""}
+    rows = [{**untold, **row} for row in stored["points"]]
+    for row in rows:
+        if row["name"] in (*stored["names"], *row["functionals"]):
+            row["column"] = row["name"]
+    return {"notes": [], "curves": [], "further": 0, "kind": _UNTOLD, "symmetry": _UNTOLD, **stored, "points": rows}
+
+
+def _system(problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int) -> System:
     values = dict(zip(head["names"], arrays[f"parameters{i}"]))
     sizes = {name.removeprefix("scale_").removesuffix(str(i)): array for name, array in arrays.items()
              if name.startswith("scale_") and name.rstrip("0123456789") + str(i) == name}  # fmt: skip
     scales = Scales.of_arrays(sizes) if sizes else None
-    return problem.discretized(head["free"], values, scales, arrays.get(f"mesh{i}", ()), head["degrees"][i])
-
-
-def _column_of(row: dict[str, Any], parameters: Mapping[str, float]) -> tuple[str, float | None]:
-    """Return the column that a point is about, and its value.
-
-    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better, where it
-    agrees. Another name is a user's.
-    """
-    if "column" in row:
-        return row["column"], row["value"]
-    column, _, text = row["name"].removeprefix("possible ").partition(" = ")
-    values = {**parameters, **row["functionals"]}
-    if column not in values or (text and not _is_number(text, values[column])):
-        return "", None
-    return column, values[column] if text and not row["name"].startswith("possible ") else None
-
-
-def _is_number(text: str, value: float) -> bool:
-    """Return whether a text is a value to the six digits that names have."""
-    try:
-        return math.isclose(float(text), value, rel_tol=1e-5, abs_tol=1e-9)
-    except ValueError:
-        return False
+    base = problem.discretized(head["free"], values, scales, arrays.get(f"mesh{i}", ()), head["degrees"][i])
+    if not head["curves"]:
+        return base
+    kind, size = head["curves"][i]
+    found: System = _curves(base)[kind].of_size(base, size)
+    return found
 
 
 def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:
-    x = arrays[f"x{number}"]
+    x, tangent = arrays[f"x{number}"], arrays[f"tangent{number}"]
     if len(x) != system.size:
-        raise ProblemError("the file is of an earlier version, which kept one point of a map's cycle only: follow it again")
-    system = system.referring_to(x, arrays[f"tangent{number}"])
-    details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
-    if row["imperfection"] is not None:
+        raise ProblemError("the file is of version 0.2, which kept one point of a map's cycle only: follow it again")
+    system = system.referring_to(x, tangent)
+    details: BranchPoint | MultiplePoint | dict[str, float] | None = row["details"]
+    if row.get("imperfection") is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
     elif row.get("dimension") is not None:
-        tangents = tuple(arrays[f"tangents{number}"])
-        details = MultiplePoint(
-            row["dimension"], arrays[f"kernel{number}"], x, tangents, row["continuum"], row.get("spread", 0.0)
-        )
+        kernel, tangents = arrays[f"kernel{number}"], tuple(arrays[f"tangents{number}"])
+        details = MultiplePoint(row["dimension"], kernel, x, tangents, row["continuum"], row.get("spread", 0.0))
+    fields: dict[str, Any] = {name: tuple(value) if isinstance(value := row[name], list) else value for name in _FIELDS}
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
-    return Point(
-        row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
-        row["iterations"], row["newton_error"], row["errors"], details, row.get("index"), row.get("nullity", 0),
-        None if row.get("index_change") is None else tuple(row["index_change"]), tuple(row.get("breaks", ())),
-        *_column_of(row, parameters),
-        row.get("discretization_error", np.nan),
-    )  # fmt: skip
+    return Point(parameters=parameters, x=x, tangent=tangent, system=system, details=details, **fields)

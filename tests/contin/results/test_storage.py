@@ -1,10 +1,12 @@
 """Branches in files."""
 
+import json
+
 import numpy as np
 import pytest
 from bank.closed_forms import elastica, parabola
 
-from contin import AlgebraicProblem, ProblemError, load, save, solve, trace
+from contin import AlgebraicProblem, CycleProblem, MapProblem, ProblemError, load, save, solve, trace
 from contin.lowlevel import read_columns
 
 
@@ -40,6 +42,51 @@ def test_what_is_no_branch_of_this_problem_is_refused(tmp_path):
         load(elastica(), tmp_path / "a.npz")
     with pytest.raises(FileNotFoundError):
         load(problem, tmp_path / "absent.npz")
+
+
+def test_the_kind_and_the_symmetry_are_compared(tmp_path):
+    """Fixed points of a map and equilibria of a field have the same names; a rotation has a symmetry that may be declared."""
+
+    def field(u, p):
+        square = u.x**2 + u.y**2
+        return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
+
+    rest, fixed = (kind(field, ["x", "y"], {"mu": -1.0}) for kind in (AlgebraicProblem, MapProblem))
+    save(trace(solve(rest, [0, 0]), free=["mu"], max_points=3), tmp_path / "a.npz")
+    assert load(rest, tmp_path / "a.npz").points
+    with pytest.raises(ProblemError, match=r"AlgebraicProblem\(states x, y; parameters mu\), not MapProblem\("):
+        load(fixed, tmp_path / "a.npz")
+    plain, half = (CycleProblem(field, ["x", "y"], {"mu": 1.0}, **more) for more in ({}, {"symmetry": [[-1, 0], [0, -1]]}))
+    save(
+        trace(solve(half, lambda t: (np.cos(2 * np.pi * t), np.sin(2 * np.pi * t))), free=["mu"], max_points=3), tmp_path / "b"
+    )
+    assert len(load(half, tmp_path / "b")) == 3
+    with pytest.raises(ProblemError, match="symmetry"):
+        load(plain, tmp_path / "b")
+
+
+def test_files_of_version_2(tmp_path):
+    """Version 0.2 left out what is new since; files of other versions are refused."""
+    problem = parabola()
+    branch = trace(solve(problem, [1.0]), free=["mu"], direction=-1, limits={"mu": (-1, 2)})
+    save(branch, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    head = json.loads(arrays.pop("head").tobytes())
+    for row in head["points"]:
+        for name in ("column", "value", "discretization_error"):
+            del row[name]
+    for name in ("notes", "curves", "further", "kind", "symmetry"):
+        del head[name]
+    for version in (1, 0):
+        text = json.dumps(head | {"format": f"contin branch {version}"}).encode()
+        np.savez(tmp_path / f"{version}.npz", head=np.frombuffer(text, dtype=np.uint8), **arrays)
+    again = load(problem, tmp_path / "1.npz")
+    assert [(point.label, *point.x) for point in again] == [(point.label, *point.x) for point in branch]
+    assert again.labelled("LP")[0].column == "mu" and str(again.stop) == str(branch.stop)
+    assert read_columns(tmp_path / "1.npz").columns["mu"].tolist() == branch["mu"].tolist()
+    with pytest.raises(ProblemError, match="no branch stored"):
+        load(problem, tmp_path / "0.npz")
 
 
 def test_columns_and_states_without_the_problem(tmp_path):
