@@ -27,7 +27,7 @@ PURPOSE = {
     "cycles": "cycles of vector fields and maps: multipliers, doublings, tori",
     "equilibria": "F(u, p) = 0: Hopf points, dependent equations",
     "boundary": "boundary value problems; energies and their index",
-    "defining": "extended systems of special points in two parameters",
+    "defining": "defining systems of special points in two parameters",
     "events": "folds, branch points, test functions, error estimates",
     "core": "the protocol of all systems; Newton's method, one step, settings",
     "collocation": "nodes, mesh, assembly, error of a solution: arrays and kernels",

@@ -1,6 +1,6 @@
 """The protocol of a discretized problem: what corrector, detection and the continuation loop ask of it.
 
-`contin.lowlevel.Collocation` and `contin.lowlevel.Algebraic` follow it, and so do the extended systems of `contin.curve`.
+`contin.lowlevel.Collocation` and `contin.lowlevel.Algebraic` follow it, and so do the defining systems of `contin.curve`.
 """
 
 from __future__ import annotations
@@ -242,11 +242,11 @@ class Discretization(Equations, Protocol):
 
     @property
     def curves(self) -> Mapping[str, type]:
-        """The extended systems of `defining`, by the label of their points."""
+        """The defining systems of `defining`, by the label of their points."""
         return {}
 
     def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
-        """Return the extended system of special points like a labelled one, and its first x; None where there is none.
+        """Return the defining system of special points like a labelled one, and its first x; None where there is none.
 
         ``x`` is the point in this system, which has one free parameter more than a curve of solutions needs. Folds, branch
         points, extrema and values of columns are no business of the kind.
@@ -301,6 +301,10 @@ class Discretization(Equations, Protocol):
 
     def coefficient(self, point: Any) -> Any:
         """Return the `Coefficient` of the normal form at a special point; None where there is none."""
+        return None
+
+    def form(self, x: Array) -> Any:
+        """Return the `contin.events.normal_forms.Form` at x, of equilibria and cycles; None of others."""
         return None
 
     def events_on_folds(self) -> list[Any]:

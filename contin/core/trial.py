@@ -191,6 +191,8 @@ class Event:
         The parameter or functional whose value, fold or extremum is looked for; "" where it is about no column.
     value : float, optional
         The value of the column at the zero.
+    normal_form : callable, optional
+        The formula of the coefficient that is given there (`contin.events.normal_forms`).
     still : float
         Part of the largest speed of a cycle at which the function is zero, where it is about the least one; kernels watch it.
 
@@ -217,6 +219,7 @@ class Event:
     unless: str = ""
     column: str = ""
     value: float | None = None
+    normal_form: Callable[..., Array] | None = None
     still: float = 0.0
 
     def holds_one_of(self, free: Sequence[str]) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
+from contin.cycles.curves import DoublingCurve, TorusCurve
 from contin.cycles.floquet import critical_angle, doubled, doubling, torus, unstable
 from contin.cycles.folds import events_on_folds
 from contin.events.arc import SpecialPoint
@@ -19,10 +20,6 @@ from contin.events.labelled import doubles
 
 class OfCycles(Discretization):
     """Hooks that both kinds of system answer alike: multipliers say all of it."""
-
-    #: The extended systems of period doublings and of torus bifurcations.
-    of_doublings: Any
-    of_tori: Any
 
     @property
     def starts_cycles(self) -> bool:
@@ -42,14 +39,14 @@ class OfCycles(Discretization):
     @property
     def curves(self) -> Mapping[str, type]:
         """Those of period doublings and torus bifurcations."""
-        return {kind.kind: kind for kind in (self.of_doublings, self.of_tori)}
+        return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
 
     def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
         system: Any = self
         if doubles(point):
-            return self.of_doublings(system), x
-        return (self.of_tori(system), np.append(x, math.cos(critical_angle(system, point, x)))) if point.label == "TR" else None
+            return DoublingCurve(system), x
+        return (TorusCurve(system), np.append(x, math.cos(critical_angle(system, point, x)))) if point.label == "TR" else None
 
     def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""

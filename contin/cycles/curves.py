@@ -1,7 +1,14 @@
-"""The extended systems of curves of period doublings and of torus bifurcations of cycles in two parameters.
+"""Defining systems of curves of period doublings and torus bifurcations, of cycles and of cycles of maps, in two parameters.
 
-A perturbation of the Poincare map (`contin.cycles.round`) that is multiplied by -1, or by exp(i theta), in a round:
-v(1) = P v(0), P that of `contin.cycles.multiplier_curves`.
+A perturbation is multiplied in a round by an eigenvalue of P. It is -1 at a period doubling. At a torus bifurcation, with
+kappa = cos(theta) and the perturbation v_1 + i sin(theta) v_2,
+
+        [ kappa   kappa^2 - 1 ]
+    P = [                     ].
+        [   1        kappa    ]
+
+The equations are regular at the strong resonances theta = 0 (R1) and theta = pi (R2), where the curve ends: beyond, with
+|kappa| > 1, two real multipliers have the product 1, which is no bifurcation.
 """
 
 from __future__ import annotations
@@ -9,33 +16,40 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.system import System
 from contin.core.trial import Event, Trial
-from contin.cycles.equations import PeriodicEquations
-from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
-from contin.cycles.normal_forms import NormalForms
-from contin.cycles.round import Round
-from contin.defining.extended import Borders
-from contin.defining.fold_curve import FoldCurve, shrinking
-from contin.events.coefficient import Coefficient
-from contin.problems.own_names import PERIOD
+from contin.cycles.normal_forms import MOST
+from contin.defining.critical_curve import CriticalCurve, degenerate
+from contin.defining.fold_curve import FoldCurve
+from contin.events.arc import Arc, SpecialPoint
+from contin.events.coefficient import UNKNOWN, Coefficient
+from contin.events.interpolated import meeting
+from contin.events.normal_forms import coefficient, flip, pair
 
+#: Cosines of the angles at strong resonances.
+RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
+#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
+#: they are located more exactly than that.
+_REAL = 1e-6
+#: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
+_NEAR = 0.05
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3
+#: Vectors are normal to each other where the cosine between them is smaller: their round-off.
+NORMAL = 1e-10
 
 
-class CycleCurve(MultiplierCurve):
-    """Cycles with a critical multiplier, on a `PeriodicEquations`."""
+class MultiplierCurve(CriticalCurve):
+    """Cycles with a critical multiplier."""
 
     @property
-    def cycles(self) -> PeriodicEquations:
-        """The underlying system."""
-        return cast(PeriodicEquations, self.base)
+    def is_long(self) -> bool:
+        """It is a cycle of a map that is too long for a normal form."""
+        return not self.base.intervals and self.base.state_size > MOST
 
     @functools.cached_property
     def _folds(self) -> FoldCurve:
@@ -43,93 +57,134 @@ class CycleCurve(MultiplierCurve):
 
     def fold(self, x: Array) -> float:
         """Return a number that vanishes where the cycle is at a fold, too."""
-        y = x[: self.base.size]
-        if self._folds.borders is not None and not self._folds.borders_fit(y):
-            self._folds.borders = None
-        return float(self._folds.null_vectors(y)[2])
-
-    @property
-    def copy_shape(self) -> tuple[int, Array]:
-        """Number of equations of one copy of L, and the weights of its unknowns."""
-        weights = np.append(self.base.weights[: self.base.state_size], np.ones(int(self.cycles.autonomous)))
-        return len(weights), weights
-
-    def bordered(self, x: Array, b: Array, c: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-        """Return functions that solve with the bordered matrix and with its transpose."""
-        solver = self.round(x).solver(self.coupling(x), (b, c))
-        return solver.solve, solver.solve_transposed
-
-    def round(self, x: Array) -> Round:
-        """Return the linearization without the multiplier that is one along every autonomous cycle."""
-        return Round(self.cycles, x[: self.base.size], phased=self.cycles.autonomous)
-
-    def _place(self, wide: Array, v: Array) -> None:
-        wide[: self.base.state_size] = v[: self.base.state_size]
-        if self.cycles.autonomous:
-            wide[self.base.parameter_index(PERIOD)] = v[-1]
-
-    def ends(self, left: Array) -> Array:
-        """Return the part of left null vectors that belongs to the condition between the ends."""
-        n = len(self.cycles.problem.state_names)
-        return left[..., self.base.state_size - n : self.base.state_size]
-
-    def functionals(self, x: Array) -> Array:
-        """Return those of the underlying problem, and the coefficient of the normal form."""
-        return np.append(super().functionals(x), self.normal_form(x).value)
-
-    def starts(self, right: Array) -> Array:
-        """Return right null vectors at t = 0, turned by the symmetry: what P multiplies."""
-        found: Array = right[..., : len(self.cycles.problem.state_names)] @ self.cycles.turn.T
-        return found
+        return float(self._folds.own_values(self.inside(x))[0])
 
 
-class DoublingCurve(Doubling, CycleCurve):
+class DoublingCurve(MultiplierCurve):
     """Period doublings: the multiplier -1; the column ``normal_form`` is its coefficient c."""
 
-    def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
-        super().__init__(base, borders, size, ("normal_form",))
+    kind = "PD"
+
+    def coupling(self, kappa: float) -> Array:
+        """Return -1."""
+        return -np.eye(1)
+
+    def coupling_slope(self, kappa: float) -> Array:
+        """Return nothing: there is no kappa."""
+        return np.empty((0, 1))
+
+    def imaginary_part(self, x: Array) -> float:
+        """Return 0: the multiplier is real."""
+        return 0.0
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return c."""
-        return NormalForms(self.cycles, x).period_doubling()
+        return UNKNOWN if self.is_long else coefficient(self.base, x, flip)
 
     def events(self) -> list[Event]:
         """Return those of a second multiplier -1, of generalized period doublings, and of folds."""
-        return [
-            *shrinking(self.cycles), second_doubling(), degenerate("GPD", "generalized period doubling"),
-            _at_fold("LPPD", "fold-flip"),
-        ]  # fmt: skip
+        own = [_second_doubling(), degenerate("GPD", "generalized period doubling")]
+        return [*super().events(), *own, *([_at_fold("LPPD", "fold-flip")] if self.base.intervals else [])]
 
 
-class TorusCurve(Pair, CycleCurve):
+class TorusCurve(MultiplierCurve):
     """Torus bifurcations: the multipliers exp(-+ i theta); columns ``normal_form``, Re d, and ``angle``, theta."""
 
-    def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
-        super().__init__(base, borders, size, ("normal_form", "angle"))
+    kind = "TR"
+    own_equations, own_unknowns = 2, 1
+    own_columns = ("normal_form", "angle")
+
+    def coupling(self, kappa: float) -> Array:
+        """Return the real matrix with the eigenvalues exp(-+ i theta)."""
+        return np.array([[kappa, kappa**2 - 1], [1.0, kappa]])
+
+    def coupling_slope(self, kappa: float) -> Array:
+        """Return its derivative."""
+        return np.array([[1.0, 2 * kappa], [0.0, 1.0]])
+
+    def imaginary_part(self, x: Array) -> float:
+        """Return sin(theta); 0 where the multipliers are real."""
+        return math.sqrt(max(1 - self.kappa(x) ** 2, 0.0))
+
+    def angle(self, x: Array) -> float:
+        """Return the angle of the pair of multipliers."""
+        return math.acos(min(max(self.kappa(x), -1.0), 1.0))
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
-        if self.is_infinite(x):
-            return Coefficient(math.nan, math.nan, math.nan)
-        return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
+        if self.is_long or self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL:
+            return UNKNOWN
+        return coefficient(self.base, self.inside(x), pair, self.angle(x))
+
+    def functionals(self, x: Array) -> Array:
+        """Return those of the underlying problem, Re d, and the angle."""
+        return np.append(super().functionals(x), self.angle(x))
 
     def events(self) -> list[Event]:
         """Return those of strong resonances, Chenciner points, and folds."""
-        return [*shrinking(self.cycles), *resonances(), degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
+        own = [*(_resonance(label, kappa) for label, kappa in RESONANCES.items()), degenerate("CH", "Chenciner")]
+        return [*super().events(), *own, *([_at_fold("LPTR", "fold-torus")] if self.base.intervals else [])]
 
 
-def _curve(trial: Trial) -> CycleCurve:
-    return cast(CycleCurve, trial.system)
+def normal_product(v: Array, w: Array, noise: float = NORMAL) -> float:
+    """Return the cosine between two vectors; 0 where it is round-off, as all along a curve of a conservative system."""
+    cosine = float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
+    return cosine if abs(cosine) > noise else 0.0
+
+
+def _second_doubling() -> Event:
+    """Return the test function of a second multiplier -1: the derivative of g by the multiplier vanishes."""
+
+    def double(trial: Trial) -> float:
+        curve = cast(DoublingCurve, trial.system)
+        right, left = curve.null_vectors(trial.x)
+        return normal_product(*curve.at(trial.x)[0].coupled_parts(left[0, 0], right[0]))
+
+    return Event("R2", "resonance 1:2", double)
 
 
 def _at_fold(label: str, name: str) -> Event:
     """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
 
     def confirm(trial: Trial) -> bool:
-        curve = _curve(trial)
-        exponents = curve.cycles.eigenvalues(trial.x[: curve.base.size])
-        own = 2 * (curve.copies == 2 and curve.angle(trial.x) < _DOUBLE)  # the pair itself is one at R1
-        known = int(curve.cycles.autonomous) + own
+        curve: Any = trial.system
+        exponents = curve.base.eigenvalues(curve.inside(trial.x))
+        own = 2 * (curve.own_unknowns and curve.angle(trial.x) < _DOUBLE)  # the pair itself is one at R1
+        known = int(curve.base.autonomous) + own
         return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
 
-    return Event(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
+    return Event(label, name, lambda trial: cast(MultiplierCurve, trial.system).fold(trial.x), confirm=confirm)
+
+
+def _resonance(label: str, kappa: float) -> Event:
+    """Return the test function of the angle with this cosine: a strong resonance; the curve ends where the angle is 0 or pi.
+
+    A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi and go back: `_touched`.
+    """
+    sign, name = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}"
+
+    def distance(trial: Trial) -> float:
+        return sign * (cast(TorusCurve, trial.system).kappa(trial.x) - kappa)
+
+    def search(arc: Arc, _: object) -> list[SpecialPoint] | None:
+        return _touched(arc, test, distance)
+
+    at_end = abs(kappa) == 1
+    test = Event(label, name, distance, terminal=at_end, search=search if at_end else None)
+    return test
+
+
+def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
+    """Return the resonance where the angle has an extremum; None where there is none in a step.
+
+    A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round comes to -1 and
+    goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where cycles that have an
+    image become their own image: there the pair comes to 1, and the curve goes back on itself.
+    """
+
+    def change(trial: Trial) -> float:
+        """Return how fast kappa changes along the curve."""
+        return float(trial.tangent[-1])
+
+    stops = f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image"
+    return meeting(arc, test, (change, distance), _NEAR, stops)

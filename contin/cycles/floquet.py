@@ -31,6 +31,7 @@ from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
 from contin.events.nearness import AS_FAR, CIRCLE, DEEPER, LOOKS, MINUS_ONE, ONE, comes_near
+from contin.events.normal_forms import flip, pair
 from contin.events.significance import on_finer_mesh
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
@@ -183,7 +184,7 @@ def doubling(order: int = 1) -> Event:
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
     label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
-    return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling)
+    return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling, normal_form=flip)
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -346,7 +347,7 @@ def critical_angle(system: PeriodicEquations | MapEquations, point: Any, x: Arra
 
 def torus() -> Event:
     """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
-    return Event("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
+    return Event("TR", "torus", hopf().function, search=_tori, asks=_may_twist, normal_form=pair)
 
 
 def _may_twist(arc: Arc) -> bool:

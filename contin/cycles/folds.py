@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from contin.core.trial import Event, Trial
+from contin.cycles.curves import NORMAL, normal_product
 from contin.cycles.equations import PeriodicEquations
 from contin.cycles.map_equations import MapEquations
 from contin.defining.critical_curve import signed_smallest
-from contin.defining.fold_curve import NORMAL, normal_product, shrinking
 
 #: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
 _REAL = 1e-12
@@ -19,7 +19,7 @@ _NORMAL_OF_MAPS = 1e-14
 
 
 def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
-    """Return the test functions of points where a further multiplier is one, or another is -1, and of where cycles shrink.
+    """Return the test functions of points where a further multiplier is one, or another is -1.
 
     The change of g with the multiplier vanishes where a further one is one.
     """
@@ -28,7 +28,7 @@ def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
 
     def further(trial: Trial) -> float:
         system: Any = trial.system
-        v, w, _ = system.null_vectors(trial.x)
+        v, w = system.null_vectors(trial.x)
         n = len(system.problem.states)
         return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
 
@@ -41,4 +41,4 @@ def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
         multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [*shrinking(cycles), Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]
+    return [Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]

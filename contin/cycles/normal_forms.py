@@ -1,34 +1,24 @@
-"""Normal forms of bifurcations of cycles (Kuznetsov, Govaerts, Doedel & Dhooge 2005), by linear boundary value problems.
+"""The characteristic matrices of cycles, and of cycles of maps, and their forms (`contin.events.normal_forms`).
 
 Time is measured in periods, s = t / T, so that the field is G = T F; J, B and C are its derivatives of first, second and third
-order along the cycle. Near it u = u0(s) + xi v(s) + ..., and in the coordinates (s, xi) of the centre manifold
+order along the cycle. L(mu) v = v' - J v, with v(1) = mu v(0) (`contin.cycles.round`; with a symmetry of order n, over one n-th
+of the period, with S v(0) for v(0)). Near a bifurcation time goes on by ds/dt = (1 - stretch) / T, but evenly with a forcing.
+The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the discrete
+equations, so that the coefficients converge with the cycle.
 
-    fold               ds/dt = (1 - alpha xi) / T,      dxi/dt = b xi^2,
-    period doubling    ds/dt = (1 + a xi^2) / T,        dxi/dt = c xi^3,
-    torus              ds/dt = (1 + a |xi|^2) / T,      dxi/dt = i theta xi / T + d xi |xi|^2.
+With the derivatives A_j, B and C of a map f at the points of a cycle, L(mu) v = r stands for the cyclic linear equations
 
-The expansion of both sides gives, power by power of xi, equations L h = r with L h = h' - J h and a condition h(1) = mu h(0).
-Where L is singular, w.r = 0 for the left null vector w is the condition that determines a coefficient:
+                     [ A_1  -1       ]  [ v_1 ]     [ r_1 ]
+                     [      A_2  -1  ]  [ v_2 ] = - [ r_2 ],     |v_1| = 1 and w_k.v_1 = 1.
+                     [ -mu       A_3 ]  [ v_3 ]     [ r_3 ]
 
-    fold               L v = alpha u0', periodic;  w.v = 1:             b T = w.(B(v, v) + 2 alpha J v) / 2
-    period doubling    L v = 0, v(1) = -v(0);  w.v = 1
-                       L h = B(v, v) - 2 a u0', periodic:               c T = w.(C(v, v, v) + 3 B(v, h) - 6 a J v) / 6
-    torus              L v = 0, v(1) = e^(i theta) v(0);  w.v = 1
-                       L h = B(v, v*) - a u0', periodic
-                       L k = B(v, v), k(1) = e^(2 i theta) k(0):
-                                            d T = w.(C(v, v, v*) + 2 B(v, h) + B(v*, k) - 2 a (J v - i theta v)) / 2
-
-The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the
-discrete equations, so that the coefficients converge with the cycle. With a symmetry of order n all this is done over one n-th
-of the period, with S v(0) for v(0). Where c or the real part of d is negative, the bifurcation
-is supercritical: the doubled cycle, or the torus, attracts on the centre manifold. The sign of b depends on that of v, and its
-absolute value is given; it vanishes at a cusp. With a forcing the time s goes on evenly, and alpha and a are zero.
+For one point the coefficients are Kuznetsov's (sections 4.5, 4.7 and 5.4); for several they are those of f applied k times, at
+the first point.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,20 +26,49 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.multilinear import of_complex
 from contin.cycles.equations import PeriodicEquations
-from contin.cycles.floquet import has_double_one
+from contin.cycles.map_equations import MapEquations
 from contin.cycles.round import Round, Solver
-from contin.events.arc import SpecialPoint
-from contin.events.coefficient import Coefficient
+from contin.events.normal_forms import DenseForm, Direction, Form
+from contin.linalg.border import Borders
 from contin.problems.own_names import PERIOD
 
-#: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
-_ROUNDS = 3
-#: The random borders.
-_SEED = 11
+#: Largest number of unknown states of a map: with twice as many, dense factors take eight times as long, a minute.
+MOST = 2000
 
 
-class NormalForms:
-    """The normal forms at one cycle; each method returns the coefficient at a bifurcation of that kind.
+def multiplier(rate: complex) -> Any:
+    """Return exp(rate); a real number where it is real but for round-off."""
+    return np.real_if_close(np.exp(rate))[()]
+
+
+class MapForm(DenseForm):
+    """That of a cycle of a map.
+
+    Parameters
+    ----------
+    system : MapEquations
+    x : ndarray, shape (size,)
+    """
+
+    doubled_side = -1
+
+    def __init__(self, system: MapEquations, x: Array) -> None:
+        size, n = system.state_size, len(system.problem.state_names)
+        matrix = system.jacobian(x)
+        matrix[np.arange(size - n, size), np.arange(n)] += 1.0  # of the first point itself: P stands there
+        super().__init__(matrix, n, lambda stacks: system.stack_along(x, stacks), system.weights[:size])
+
+    def coupling(self, rate: complex) -> Any:
+        """Return the multiplier."""
+        return multiplier(rate)
+
+    def unit(self, rate: complex) -> complex:
+        """Return one over the multiplier."""
+        return complex(np.exp(-rate))
+
+
+class CycleForm(Form):
+    """That of a cycle of a vector field.
 
     Parameters
     ----------
@@ -59,139 +78,91 @@ class NormalForms:
 
     def __init__(self, system: PeriodicEquations, x: Array) -> None:
         self.system, self.x = system, x
-        self.plain = Round(system, x, phased=False)
-        self.phased = self.plain.with_period() if system.autonomous else self.plain
-        self.points = system.at_gauss_points(x)
-        self.jacobian = system.rates_by_states(x, self.points)
-        self.h = np.repeat(np.diff(system.mesh), system.degree)[:, None]
-        self.period = float(x[system.parameter_index(PERIOD)]) if system.autonomous else 1.0  # as it stands in x
-
-    def fold(self) -> Coefficient:
-        """Return the absolute value of b."""
-        found = self._coefficient(NormalForms._of_fold)
-        return Coefficient(abs(found.value), found.error, found.size)
-
-    def period_doubling(self) -> Coefficient:
-        """Return c."""
-        return self._coefficient(NormalForms._of_period_doubling)
-
-    def torus(self, angle: float) -> Coefficient:
-        """Return the real part of d."""
-        return self._coefficient(lambda forms: forms._of_torus(angle))
-
-    def _coefficient(self, terms: Callable[[NormalForms], Array]) -> Coefficient:
-        """Return a coefficient per unit of time from its terms in x."""
-        return Coefficient.of(lambda x: terms(self if x is self.x else NormalForms(self.system, x)), self.x, self.system)
-
-    # --- the terms of the coefficients ---------------------------------------------------------------------------
-
-    def _of_fold(self) -> Array:
-        v, w = self._null_vectors(self.phased, 1.0)
-        system: Any = self.system
-        if system.autonomous:
-            states = np.ascontiguousarray(self.x[: system.state_size].reshape(system.nodes.size, -1))
-            along = system.rates(self.x, states).ravel()
-            v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
-        v = v / np.sqrt(self._mean(v, v))
-        u, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
-        w = w / self._product(w, u)
-        return self._products(w, [self._along(u, u), 2 * alpha * self._apply(u)], 2)
-
-    def _of_period_doubling(self) -> Array:
-        u, w = self._critical(-1.0)
-        h, change = self._periodic(self._along(u, u))
-        a = -change / (2 * self.period)
-        return self._products(w, [self._along(u, u, u), 3 * self._along(u, h), -6 * a * self._apply(u)], 6)
-
-    def _of_torus(self, angle: float) -> Array:
-        u, w = self._critical(np.exp(1j * angle))
-        h, change = self._periodic(self._along(u, u.conj()).real)
-        a = -change / self.period
-        twice = self.plain.solver(np.exp(2j * angle))
-        k = self._at_points(twice.solve(self._right_side(self._along(u, u), self.plain)))
-        slope = -2 * a * (self._apply(u) - 1j * angle * u)
-        return self._products(w, [self._along(u, u, u.conj()), 2 * self._along(u, h), self._along(u.conj(), k), slope], 2)
-
-    def _products(self, w: Array, terms: Sequence[Array], factor: float) -> Array:
-        """Return the real parts of the products of w with the terms, per unit of time, over a factor."""
-        return np.array([self._product(w, term).real for term in terms]) / (factor * self.system.unit_time(self.x))
-
-    # --- solutions of the linear problems ------------------------------------------------------------------------
-
-    def _null_vectors(self, matrix: Round, multiplier: Any) -> tuple[Array, Array]:
-        """Return the right and the left null vector."""
-        random = np.random.default_rng(_SEED)
-        b, c = random.standard_normal(matrix.size), random.standard_normal(matrix.size)
-        unit = np.zeros(matrix.size + 1, dtype=np.result_type(multiplier))
-        unit[-1] = 1.0
-        for _ in range(_ROUNDS):
-            solver = matrix.solver(multiplier, (b, c))
-            v, w = solver.solve(unit)[:-1], solver.solve_transposed(unit)[:-1]
-            b, c = w.conj() / np.linalg.norm(w), v.conj() / np.linalg.norm(v)
-        return v, w
-
-    def _critical(self, multiplier: Any) -> tuple[Array, Array]:
-        """Return v at the Gauss points, and w, of a multiplier that is not one."""
-        v, w = self._null_vectors(self.plain, multiplier)
-        v = v / np.sqrt(self._mean(v, v.conj()).real)
-        here = self._at_points(v)
-        return here, w / self._product(w, here)
-
-    def _periodic(self, right_side: Array) -> tuple[Array, float]:
-        """Return the periodic h with L h = right side + change * F, at the Gauss points, and this change of the period."""
-        solution = self._periodic_solver.solve(self._right_side(right_side, self.phased))
-        return self._at_points(solution), float(solution[-1]) if self.system.autonomous else 0.0
+        self._around = Round(system, x, phased=False)
+        self._period = float(x[system.parameter_index(PERIOD)]) if system.autonomous else 1.0  # as it stands in x
+        self.places, self.equations = np.arange(system.state_size), self._around.size
+        self.weights = system.weights[self.places]
 
     @functools.cached_property
-    def _periodic_solver(self) -> Solver:
-        return self.phased.solver(np.eye(1))
+    def reduced(self) -> CycleForm:
+        """The same with a change of the period, and a condition at t = 0, of autonomous cycles."""
+        if not self.system.autonomous:
+            return self
+        other = CycleForm.__new__(CycleForm)
+        other.__dict__.update(self.__dict__)
+        other._around = self._around.with_period()
+        other.places, other.equations = np.append(self.places, self.system.parameter_index(PERIOD)), other._around.size
+        other.weights = self.system.weights[other.places]
+        return other
 
-    def _right_side(self, values: Array, matrix: Round) -> Array:
-        """Return values at the Gauss points as the right side of the discrete equations."""
-        result = np.zeros(matrix.size, dtype=values.dtype)
-        result[: values.size] = (self.h * values).ravel()
-        return result
+    def solver(self, coupling: Any, border: Borders | None = None) -> Solver:
+        """Return the solver of a round."""
+        return self._around.solver(coupling, border)
 
-    def _product(self, w: Array, values: Array) -> Any:
+    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+        """Return the part of w that belongs to the condition between the ends of the round, and S v(0)."""
+        n, size = self.system.states_count, self.system.state_size
+        return left[..., size - n : size], right[..., :n] @ self.system.turn.T
+
+    def coupling(self, rate: complex) -> Any:
+        """Return the multiplier."""
+        return multiplier(rate)
+
+    def unit(self, rate: complex) -> complex:
+        """Return one over the unit of time."""
+        return 1 / self.system.unit_time(self.x)
+
+    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+        """Return w and v, normal to u0' where a multiplier is one."""
+        size, system = self.system.state_size, self.system
+        if len(right) > size:
+            cycles: Any = system  # an autonomous one
+            along = cycles.rates(self.x, np.ascontiguousarray(self.x[:size].reshape(system.nodes.size, -1))).ravel()
+            right = right.copy()
+            right[:size] -= self._mean(right, along) / self._mean(along, along) * along
+        v = self._direction(right / np.sqrt(self._mean(right, right.conj()).real))
+        return left / self.product(left, v.states), v
+
+    def solve(self, rate: complex, values: Any) -> Direction:
+        """Return the h with L h = values."""
+        right = np.zeros(self.equations, dtype=values.dtype)
+        right[: values.size] = (self._widths * values).ravel()
+        return self._direction(self.solver(self.coupling(rate)).solve(right))
+
+    def along(self, *directions: Any) -> Any:
+        """Return B or C along directions at the Gauss points, real or complex."""
+        along = self.system.rates_along
+        return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)
+
+    def product(self, left: Any, values: Any) -> complex:
         """Return w.values."""
-        return w[: values.size] @ (self.h * values).ravel()
+        return complex(left[: values.size] @ (self._widths * values).ravel())
 
-    def _mean(self, v: Array, w: Array) -> Any:
+    def along_time(self, states: Any) -> Any:
+        """Return J v at the Gauss points."""
+        return np.einsum("kij,kj->ki", self._jacobian, states)
+
+    @functools.cached_property
+    def _jacobian(self) -> Array:
+        return self.system.rates_by_states(self.x, self._points)
+
+    @functools.cached_property
+    def _points(self) -> Array:
+        return self.system.at_gauss_points(self.x)
+
+    @property
+    def _widths(self) -> Array:
+        return np.repeat(np.diff(self.system.mesh), self.system.degree)[:, None]
+
+    def _mean(self, v: Any, w: Any) -> Any:
         """Return the mean of v.w over the period, in the user's units."""
         size = self.system.state_size
         weights = self.system.weights[:size] * self.system.unscaled_factors[:size] ** 2
         return weights @ (v[:size] * w[:size])
 
-    def _at_points(self, v: Array) -> Array:
-        """Return states at the nodes, interpolated to the Gauss points."""
-        system, n = self.system, self.points.shape[1]
-        local = v[: system.state_size].reshape(-1, n)[system.by_interval]
-        points: Array = np.einsum("qm,jma->jqa", system.basis.value, local).reshape(-1, n)
-        return points
-
-    # --- derivatives ---------------------------------------------------------------------------------------------
-
-    def _along(self, *directions: Any) -> Any:
-        """Return B or C along directions at the Gauss points, real or complex."""
-        along = self.system.rates_along
-        return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)
-
-    def _apply(self, v: Array) -> Array:
-        """Return J v."""
-        result: Array = np.einsum("kij,kj->ki", self.jacobian, v)
-        return result
-
-
-def at_special_point(system: PeriodicEquations, point: SpecialPoint) -> Coefficient | None:
-    """Return the coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses.
-
-    These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.
-    """
-    with np.errstate(all="ignore"):
-        if point.label == "LP" and point.details is None and point.is_located:
-            return NormalForms(system, point.trial.x).fold()
-        if point.label not in ("PD", "BP", "TR") or not point.is_simple or has_double_one(system, point.trial.x):
-            return None
-        if point.label in ("PD", "BP"):
-            return NormalForms(system, point.trial.x).period_doubling()
-        return NormalForms(system, point.trial.x).torus(point.details["frequency"])
+    def _direction(self, v: Any) -> Direction:
+        """Return the states at the nodes, interpolated to the Gauss points, and the change of the period."""
+        system, n, size = self.system, self.system.states_count, self.system.state_size
+        local = v[:size].reshape(-1, n)[system.by_interval]
+        states = np.einsum("qm,jma->jqa", system.basis.value, local).reshape(-1, n)
+        return Direction(states, float(v[size]) / self._period if len(v) > size else 0.0)

@@ -132,7 +132,9 @@ class Solver:
         return np.concatenate([*values, traces[..., 2 * n :]], axis=-1)
 
     def solve(self, b: Array) -> Array:
-        """Return the x with A x = b."""
+        """Return the x with A x = b, or for rows of b the rows x."""
+        if b.ndim == 2:
+            return np.array([self.solve(row) for row in b])
         copies, size, inside, n = len(self._coupling), self._round.size, self._collocated.inside, self._round.n
         own, borders = b[: copies * size].reshape(copies, size), b[copies * size :].reshape(copies, -1)
         v = self._collocated.solve(own[:, :inside])
@@ -141,7 +143,9 @@ class Solver:
         return np.append(np.hstack([v, y[:, n : n + self._round.phased]]), y[:, n + self._round.phased :])
 
     def solve_transposed(self, c: Array) -> Array:
-        """Return the y with A^T y = c."""
+        """Return the y with A^T y = c, likewise."""
+        if c.ndim == 2:
+            return np.array([self.solve_transposed(row) for row in c])
         copies, around, n = len(self._coupling), self._round, self._round.n
         own, borders = c[: copies * around.size].reshape(copies, around.size), c[copies * around.size :].reshape(copies, -1)
         v, of_period = own[:, : around.states], own[:, around.states :]

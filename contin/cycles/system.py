@@ -12,15 +12,15 @@ from contin.core.state import Reason, Stop
 from contin.core.step import COLLAPSED
 from contin.core.trial import Event, Trial
 from contin.cycles.branches import OfCycles
-from contin.cycles.curves import DoublingCurve, TorusCurve
 from contin.cycles.equations import CycleEquations, ForcedEquations, PeriodicEquations
-from contin.cycles.floquet import keep_off_one
+from contin.cycles.floquet import has_double_one, keep_off_one
 from contin.cycles.homoclinic import explained, homoclinic
 from contin.cycles.hopf_end import AMPLITUDE, hopf_point_inside, shrunk
-from contin.cycles.normal_forms import at_special_point
+from contin.cycles.normal_forms import CycleForm
 from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import Coefficient
+from contin.events.normal_forms import at_special_point
 from contin.problems.own_names import PERIOD
 
 #: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
@@ -29,8 +29,6 @@ _DIGITS = 9
 
 class PeriodicCollocation(OfCycles, PeriodicEquations):
     """A `CycleProblem` on a mesh: what forced and autonomous ones know of their branches."""
-
-    of_doublings, of_tori = DoublingCurve, TorusCurve
 
     @property
     def monodromy(self) -> Monodromy:
@@ -41,8 +39,17 @@ class PeriodicCollocation(OfCycles, PeriodicEquations):
         """Return whether no multiplier but the one that is 1 comes near 1: that is where cycles branch."""
         return keep_off_one(arc)
 
+    def form(self, x: Array) -> CycleForm:
+        """Return that of a cycle."""
+        return CycleForm(self, x)
+
     def coefficient(self, point: SpecialPoint) -> Coefficient | None:
-        """Return those of folds, period doublings and torus bifurcations."""
+        """Return those of folds, period doublings and torus bifurcations.
+
+        These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.
+        """
+        if point.is_simple and has_double_one(self, point.trial.x):
+            return None
         return at_special_point(self, point)
 
 

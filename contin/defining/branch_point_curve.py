@@ -1,4 +1,9 @@
-"""The extended system of a curve of branch points in two parameters: F + beta psi = 0 and g = 0, with beta unknown.
+"""The defining system of a curve of branch points in two parameters: F + beta psi = 0 and g = 0, with beta unknown.
+
+                                     x     mu    beta
+                                  [ F_x   F_mu   psi ]
+                                  [    dg_1       0  ]     dg_i = -w.F_xy v_i
+                                  [    dg_2       0  ]
 
 The two numbers g are those of `contin.events.bordered`. It is the curve of points where two branches cross on the unfolded
 problem; beta stays zero where the bifurcation is perfect (a symmetry, a trivial branch).
@@ -6,21 +11,14 @@ problem; beta stays zero where the bifurcation is perfect (a symmetry, a trivial
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.system import System
-from contin.core.trial import Event
-from contin.defining.extended import FITS, Borders, Extended, cosine
-from contin.defining.fold_curve import shrinking
-from contin.events.bordered import BorderedMatrix
-from contin.events.branch_point import locate_branch_point
-from contin.linalg.factors import Factors
+from contin.defining.system import Defining
+from contin.events.bordered import BorderedMatrix, bordered_at
 
 
-class BranchPointCurve(Extended):
+class BranchPointCurve(Defining):
     """F + beta psi = 0 with both g zero; unknowns [those of ``base`` | beta].
 
     Parameters
@@ -30,53 +28,26 @@ class BranchPointCurve(Extended):
     """
 
     kind = "BP"
+    own_equations, own_unknowns = 2, 1
 
-    def __init__(self, base: System, borders: Borders | None = None) -> None:
-        super().__init__(base, borders)
-        self.size = base.size + 1
-        self.equations = base.equations + 2
-        self.weights = np.append(base.weights, 1.0)
+    def computed(self, x: Array) -> BorderedMatrix:
+        """Return the bordered matrix, with the second parameter held."""
+        found = bordered_at(*self.base.with_free(self.base.free[:-1], self.inside(x)), self.borders)
+        self.borders = found.borders
+        return found
 
-    def on(self, base: System) -> BranchPointCurve:
-        """Return the extended system of another underlying one, with borders of its own."""
-        return BranchPointCurve(base)
+    def own_values(self, x: Array) -> Array:
+        """Return g."""
+        found: BorderedMatrix = self.at(x)
+        return found.g
 
-    def _bordered(self, x: Array) -> tuple[System, Array, BorderedMatrix]:
-        """Return the system with the second parameter held, its x, and the bordered matrix."""
-        system, inside = self.base.with_free(self.base.free[:-1], x[: self.base.size])
-        if self.borders is None:
-            found = locate_branch_point(system, inside)
-            self.borders = (found.kernel, found.left)
-        return system, inside, BorderedMatrix(system, inside, *self.borders)
+    def own_gradients(self, x: Array) -> Array:
+        """Return dg/dx; the second parameter does not move along the kernel."""
+        found: BorderedMatrix = self.at(x)
+        y, w = self.inside(x), found.multipliers()
+        return np.array([np.append(-self.base.bent(y, w, np.append(v, 0.0)), 0.0) for v in found.kernel])
 
-    def borders_fit(self, x: Array) -> bool:
-        """Return whether kernel and left null vector have not turned away from the borders."""
-        system, _, matrix = self._bordered(x)
-        longest = max(np.sqrt((system.weights * v) @ v) for v in matrix.kernel)  # 1 where the kernel lies along its border
-        return not min(1 / longest, cosine(self.borders[1], matrix.multipliers())) < FITS
-
-    def residual(self, x: Array) -> Array:
-        """Return F + beta psi, and g."""
-        system, inside, matrix = self._bordered(x)
-        return np.concatenate([system.residual(inside) + x[-1] * self.borders[1], matrix.g])
-
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return the residual and the factored bordered matrix, with the gradients of g, -w.F_xy v."""
-        base, y = self.base, x[: self.base.size]
-        _, _, matrix = self._bordered(x)
-        w = matrix.multipliers()
-        gradients = []
-        for v in matrix.kernel:
-            wide = np.append(v, 0.0)  # the second parameter does not move along the kernel
-            gradients.append(np.append(-base.bent(y, w, wide), 0.0))
-        rows, columns = self.shaped(rows, columns)
-        top = np.hstack([np.array(gradients), columns[:, -2:].T])
-        psi = self.borders[1]
-        residual, factors = base.linearize(y, np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))
-        return np.concatenate([residual + x[-1] * psi, matrix.g]), factors
-
-    def events(self) -> list[Event]:
-        """Return that of the end where cycles shrink onto an equilibrium."""
-        return shrinking(self.base)
+    def own_vectors(self, x: Array) -> Array:
+        """Return psi."""
+        found: BorderedMatrix = self.at(x)
+        return found.borders[1][None]

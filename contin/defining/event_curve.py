@@ -1,4 +1,4 @@
-"""The extended system of a curve along which a function of the solution keeps the value zero: F = 0 and e = 0.
+"""The defining system of a curve along which a function of the solution keeps the value zero: F = 0 and e = 0.
 
 The function may be a column less a value, or any test function: of a user, or of a curve in two parameters. Where its gradient
 is not known, it is taken on the solutions of F = 0 only. With k rows Phi that make the matrix regular, k the unknowns of F = 0
@@ -15,35 +15,39 @@ columns of V, each times its row of Phi: k derivatives by differences, for any n
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.differences import derivative
+from contin.core.system import System
 from contin.core.trial import Event, Trial
-from contin.defining.extended import FITS, Borders, Extended
-from contin.defining.fold_curve import shrinking
+from contin.defining.system import Defining
 from contin.events.arc import SpecialPoint
-from contin.events.extrema import orthonormal
-from contin.linalg.factors import Factors
+from contin.events.extrema import fits, orthonormal
 
 
-class EventCurve(Extended):
+class _Solutions(NamedTuple):
+    """x - y, and V as rows (k, size)."""
+
+    x: Array
+    tangents: Array
+
+
+class EventCurve(Defining):
     """F = 0 and e = 0, in the free parameters of ``base``.
 
     Parameters
     ----------
-    base : System or Extended
+    base : System or Defining
         With one free parameter more than its curves need.
     function : callable
         ``function(trial)``, as in `Event`.
     gradient : callable, optional
         ``gradient(system, x)`` returns the derivatives by x, shape (size,).
-    borders : pair of ndarray, optional
-        Of which only the second is used: the rows Phi.
     label : str
         That of the function.
     """
@@ -53,75 +57,47 @@ class EventCurve(Extended):
         base: Any,
         function: Callable[[Trial], float],
         gradient: Callable[[Any, Array], Array] | None = None,
-        borders: Borders | None = None,
         label: str = "",
     ) -> None:
-        super().__init__(base, borders)
+        super().__init__(base)
         self.function, self._gradient, self.label = function, gradient, label
-        self.equations = base.equations + 1
-        self._known: tuple[bytes, Array, Array] | None = None
 
-    def on(self, base: Any) -> EventCurve:
-        """Return the extended system of another underlying one, with borders of its own."""
-        return EventCurve(base, self.function, self._gradient, label=self.label)
+    def on(self, base: System) -> EventCurve:
+        """Return the defining system of another underlying one."""
+        return EventCurve(base, self.function, self._gradient, self.label)
 
-    def borders_fit(self, x: Array) -> bool:
-        """Return whether the tangents, and null vectors of the underlying curve, have not turned away from their borders."""
-        base: Any = self.base
-        if base.on_curve and not base.borders_fit(x):
-            return False
-        if self._gradient is not None:
-            return True
-        longest = max(np.sqrt((self.weights * v) @ v) for v in self._solutions(x)[1])  # 1 where it lies along its border
-        return not 1 / longest < FITS
+    def computed(self, x: Array) -> _Solutions:
+        """Return the solutions of F = 0 around x; rows Phi are those that are kept, as long as they fit."""
+        rows = np.random.default_rng(11).standard_normal((self.size - self.base.equations, self.size))
+        found = self._solved(x, rows if self.borders is None else self.borders)
+        if self.borders is None or not fits(found.tangents, self.weights):
+            self.borders = orthonormal(found.tangents, self.weights) * self.weights
+            found = self._solved(x, self.borders)
+        return found
 
-    def _solutions(self, x: Array) -> tuple[Array, Array]:
-        """Return x - y and V, as rows (k, size); rows Phi are made where there are none."""
-        key = x.tobytes()
-        if self._known is None or self._known[0] != key:
-            count = self.size - self.base.equations
-            if self.borders is None:
-                random = np.random.default_rng(11).standard_normal((count, self.size))
-                tangents = self._solved(x, random)[1]
-                self.borders = (np.empty(0), orthonormal(tangents, self.weights) * self.weights)
-            self._known = key, *self._solved(x, self.borders[1])
-        return self._known[1:]
-
-    def _solved(self, x: Array, rows: Array) -> tuple[Array, Array]:
+    def _solved(self, x: Array, rows: Array) -> _Solutions:
         residual, factors = self.base.linearize(x, rows)
-        unit = np.zeros((len(rows), self.size))
-        unit[:, self.size - len(rows) :] = np.eye(len(rows))
-        right_sides = np.vstack([np.append(residual, np.zeros(len(rows))), unit])
+        right_sides = np.eye(len(rows) + 1, self.size, self.size - len(rows) - 1)
+        right_sides[0] = np.append(residual, np.zeros(len(rows)))
         solutions = factors.solve(right_sides)
-        return x - solutions[0], solutions[1:]
+        return _Solutions(x - solutions[0], solutions[1:])
 
     def value(self, x: Array) -> float:
         """Return e at x."""
         return float(self.function(Trial.without_tangent(self.base, x)))
 
-    def _own_value(self, x: Array) -> float:
-        return self.value(x if self._gradient is not None else self._solutions(x)[0])
+    def own_values(self, x: Array) -> Array:
+        """Return e."""
+        return np.array([self.value(x if self._gradient is not None else self.at(x).x)])
 
-    def gradient(self, x: Array) -> Array:
-        """Return the derivatives of e by x, shape (size,)."""
+    def own_gradients(self, x: Array) -> Array:
+        """Return the derivatives of e by x."""
         if self._gradient is not None:
-            known: Array = self._gradient(self.base, x)
-            return known
-        there, tangents = self._solutions(x)
-        sizes = [1 / np.abs(v).max() for v in tangents]
-        slopes = [derivative(lambda s: self.value(there + s * v), 1, size)[0] for v, size in zip(tangents, sizes)]  # noqa: B023
-        gradient: Array = np.array(slopes) @ self.borders[1]
-        return gradient
-
-    def residual(self, x: Array) -> Array:
-        """Return F and e."""
-        return np.append(self.base.residual(x), self._own_value(x))
-
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return F and e, and the factored bordered matrix; the row of e comes first among the border rows."""
-        return self.with_own_rows(x, (self.gradient(x)[None], np.array([self._own_value(x)])), rows, columns)
+            return self._gradient(self.base, x)[None]
+        there, tangents = self.at(x)
+        slopes = [derivative(lambda s: self.value(there + s * v), 1, 1 / np.abs(v).max())[0] for v in tangents]  # noqa: B023
+        gradient: Array = np.array(slopes) @ self.borders
+        return gradient[None]
 
     def events(self) -> list[Event]:
         """Return that of the end where cycles shrink, and those of solutions that are special in another way, too."""
@@ -132,7 +108,7 @@ class EventCurve(Extended):
             )
             for test in others
         ]
-        return [*shrinking(self.base), *inside]
+        return [*super().events(), *inside]
 
     def judged(self, point: SpecialPoint) -> SpecialPoint:
         """Return a special point, by the label and name that the kind knows it by."""
@@ -147,4 +123,4 @@ def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
 
 def _solution(trial: Trial) -> Trial:
     system: Any = trial.system
-    return Trial.without_tangent(system.base, trial.x[: system.base.size])
+    return Trial.without_tangent(system.base, system.inside(trial.x))

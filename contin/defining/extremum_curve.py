@@ -1,27 +1,22 @@
-"""The extended system of a curve of extrema: successive continuation, as in AUTO's demos ``opt``, ``ops`` and ``obv``.
+"""The defining system of a curve of extrema: successive continuation, as in AUTO's demos ``opt``, ``ops`` and ``obv``.
 
 An extremum of a column G along a branch in one parameter is followed in two, an extremum along that curve in three, and so on.
 With j parameters beyond those that fix a solution, and one parameter more, which is held, the solutions of F = 0 are a manifold
-of dimension j. The extended system is F = 0, g = 0 with the j derivatives g of G on it (`contin.events.extrema`).
+of dimension j. The system is F = 0, g = 0 with the j derivatives g of G on it (`contin.events.extrema`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
-import numpy as np
+from typing import cast
 
 from contin.arrays import Array
 from contin.core.system import System
 from contin.core.trial import Event, Trial
-from contin.defining.extended import FITS, Borders, Extended
-from contin.defining.fold_curve import shrinking
+from contin.defining.system import Defining
 from contin.events.extrema import Stationarity, curvatures
-from contin.linalg.factors import Factors
 
 
-class ExtremumCurve(Extended):
+class ExtremumCurve(Defining):
     """F = 0 and g = 0; the last free parameter of ``base`` is the one that is held in the extrema.
 
     Parameters
@@ -29,50 +24,33 @@ class ExtremumCurve(Extended):
     base : System
     objective : str
         The column G.
-    borders : pair of ndarray, optional
-        Of which only the second is used: the rows Phi.
     """
 
-    base: System
-
-    def __init__(self, base: System, objective: str, borders: Borders | None = None) -> None:
-        super().__init__(base, borders)
-        self.objective = objective
-        self.count = base.size - base.equations - 1
-        self.equations = base.equations + self.count
-        self._known: tuple[bytes, Stationarity] | None = None
+    def __init__(self, base: System, objective: str) -> None:
+        self.objective, self.own_equations = objective, base.size - base.equations - 1
+        super().__init__(base)
 
     def on(self, base: System) -> ExtremumCurve:
-        """Return the extended system of another underlying one, with borders of its own."""
+        """Return the defining system of another underlying one."""
         return ExtremumCurve(base, self.objective)
 
-    def stationarity(self, x: Array) -> Stationarity:
-        """Return the derivatives of G at x; rows Phi are made where there are none."""
-        key = x.tobytes()
-        if self._known is None or self._known[0] != key:
-            held = [self.base.size - 1]
-            if self.borders is None:
-                first = Stationarity(self.base, x, self.objective, held)
-                self.borders = (np.empty(0), first.orthonormal() * self.base.weights)
-            self._known = key, Stationarity(self.base, x, self.objective, held, self.borders[1])
-        return self._known[1]
+    def computed(self, x: Array) -> Stationarity:
+        """Return the derivatives of G; the rows Phi are those that are kept, as long as they fit."""
+        found = Stationarity(self.base, x, self.objective, [self.base.size - 1], self.borders)
+        if not found.fits:
+            self.borders = found.orthonormal() * self.base.weights
+            found = Stationarity(self.base, x, self.objective, [self.base.size - 1], self.borders)
+        return found
 
-    def borders_fit(self, x: Array) -> bool:
-        """Return whether the tangents have not turned away from the borders."""
-        weights = self.base.weights
-        longest = max(np.sqrt((weights * v) @ v) for v in self.stationarity(x).kernel)  # 1 where it lies along its border
-        return not 1 / longest < FITS
+    def own_values(self, x: Array) -> Array:
+        """Return g."""
+        found: Stationarity = self.at(x)
+        return found.g
 
-    def residual(self, x: Array) -> Array:
-        """Return F and g."""
-        return np.append(self.base.residual(x), self.stationarity(x).g)
-
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return F and g, and the factored bordered matrix; the rows of g come first among the border rows."""
-        found = self.stationarity(x)
-        return self.with_own_rows(x, (found.gradients(), found.g), rows, columns)
+    def own_gradients(self, x: Array) -> Array:
+        """Return dg/dx."""
+        found: Stationarity = self.at(x)
+        return found.gradients()
 
     def events(self) -> list[Event]:
         """Return those of extrema in one parameter more: the derivative by the held parameter vanishes, too.
@@ -81,9 +59,9 @@ class ExtremumCurve(Extended):
         """
 
         def slope(trial: Trial) -> float:
-            system: Any = trial.system
-            return float(system.stationarity(trial.x).by_held[0])
+            return float(cast(ExtremumCurve, trial.system).at(trial.x).by_held[0])
 
         name = self.objective
-        found = Event("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name)
-        return [found, *shrinking(self.base)]
+        return [
+            Event("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name), *super().events()
+        ]  # fmt: skip

@@ -15,7 +15,7 @@ def events_on_folds() -> list[Event]:
 
     def double_zero(trial: Trial) -> float:
         system: Any = trial.system
-        v, w, _ = system.null_vectors(trial.x)
+        v, w = system.null_vectors(trial.x)
         base, scales = system.base, system.base.scales
         v, w = v[: base.state_size] * scales.states, w / scales.rows["residual"]
         return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))

@@ -13,11 +13,12 @@ from contin.equilibria.dependence import dependence
 from contin.equilibria.equations import AlgebraicEquations
 from contin.equilibria.folds import events_on_folds
 from contin.equilibria.hopf_curve import HopfCurve
-from contin.equilibria.lyapunov import at_hopf_point, critical_pair
+from contin.equilibria.lyapunov import critical_pair, form_of
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
+from contin.events.normal_forms import DenseForm, at_special_point, fold
 from contin.functions.batch import Batch
 
 
@@ -91,6 +92,10 @@ class Algebraic(AlgebraicEquations):
         """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""
         return events_on_folds() if self.problem.dynamics else []
 
+    def form(self, x: Array) -> DenseForm:
+        """Return that of an equilibrium."""
+        return form_of(self, x)
+
     def coefficient(self, point: SpecialPoint) -> Coefficient | None:
-        """Return the first Lyapunov coefficient at a Hopf point."""
-        return at_hopf_point(self, point)
+        """Return the first Lyapunov coefficient at a Hopf point; of folds, which take .3 ms, nothing."""
+        return None if point.test is None or point.test.normal_form is fold else at_special_point(self, point)

@@ -14,10 +14,14 @@ coordinates s. The branch point is where the gradient vanishes, and the Hessian 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.protocol import Discretization
+from contin.core.protocol import Discretization, inner
+from contin.errors import ConvergenceError
+from contin.linalg.border import FITS, Bordered, cosine
 from contin.linalg.singular import smallest_directions
 
 #: Smallest singular value of M, relative to the second smallest, below which M counts as singular. At double points of random
@@ -40,6 +44,8 @@ class BorderedMatrix:
 
     Attributes
     ----------
+    borders : pair of ndarray
+        Phi and psi.
     residual : ndarray, shape (equations,)
         F(x).
     kernel : ndarray, shape (2, size)
@@ -52,10 +58,10 @@ class BorderedMatrix:
     def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:
         rows = np.zeros((2, system.size + 1))
         rows[:, :-1] = phi * system.weights
-        self._system = system
+        self._system, self.borders = system, (phi, psi)
         self.residual, self.factors = system.linearize(x, rows, psi[None, :])
-        solutions = self.factors.solve(np.hstack([np.zeros((2, system.equations)), np.eye(2)]))
-        self.kernel, self.g = solutions[:, :-1], solutions[:, -1]
+        self._bordered = Bordered(self.factors, (system.equations, system.size), rows=2)
+        self.kernel, self.g = self._bordered.right, self._bordered.g[:, 0]
 
     def is_regular(self) -> bool:
         """Return whether M is regular. It is singular where the kernel of F_x has more than two dimensions."""
@@ -67,9 +73,8 @@ class BorderedMatrix:
 
     def multipliers(self) -> Array:
         """Return w, the row of the inverse that belongs to psi: w.psi = 1, dg = -w.F_xy v; about the left null vector."""
-        unit = np.zeros(self._system.size + 1)
-        unit[-1] = 1.0
-        return self.factors.solve_transposed(unit)[: self._system.equations]
+        w: Array = self._bordered.left[0]
+        return w
 
     def left(self) -> Array:
         """Return the multipliers with unit length."""
@@ -84,3 +89,35 @@ class BorderedMatrix:
         w, (a, b) = self.multipliers(), self.kernel
         aa, ab, bb = (float(-w @ self._system.along(x, pair)) for pair in ((a, a), (a, b), (b, b)))
         return np.array([[aa, ab], [ab, bb]])
+
+
+def bordered_at(system: Discretization, x: Array, borders: tuple[Array, Array] | None) -> BorderedMatrix:
+    """Return M at x with borders that fit its null vectors: those given, or new ones where these have turned, or are None."""
+    if borders is None:
+        return BorderedMatrix(system, x, *borders_at(system, x))
+    found = BorderedMatrix(system, x, *borders)
+    longest = max(np.sqrt(inner(system, v, v)) for v in found.kernel)  # 1 where the kernel lies along its border
+    if not min(1 / longest, cosine(borders[1], found.multipliers())) < FITS:
+        return found
+    return BorderedMatrix(system, x, orthonormal(system, found.kernel), found.left())
+
+
+def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
+    """Return borders made of null vectors at x: of those that random borders give, or rows about the ``kernel``."""
+    random = np.random.default_rng(20240501)
+    phi = orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
+    matrix = BorderedMatrix(system, x, phi, random.standard_normal(system.equations) / np.sqrt(system.equations))
+    if not np.isfinite(matrix.kernel).all():
+        raise ConvergenceError("no branch point near by: the bordered matrix is singular")
+    return orthonormal(system, matrix.kernel), matrix.left()
+
+
+def orthonormal(system: Discretization, vectors: Iterable[Array]) -> Array:
+    """Return vectors as rows made orthonormal in the weighted inner product: Gram-Schmidt, twice."""
+    result: list[Array] = []
+    for vector in vectors:
+        for _ in range(2):
+            for other in result:
+                vector = vector - inner(system, vector, other) * other
+        result.append(vector / np.sqrt(inner(system, vector, vector)))
+    return np.array(result)

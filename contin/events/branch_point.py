@@ -8,7 +8,6 @@ the change of the gradient updates it (Broyden's rule).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,7 +17,7 @@ from contin.arrays import Array
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
-from contin.events.bordered import BorderedMatrix
+from contin.events.bordered import BorderedMatrix, borders_at, orthonormal
 from contin.events.labelled import Elsewhere, Finding
 from contin.linalg.orientation import ordered, oriented, oriented_along
 
@@ -237,14 +236,7 @@ class _Search:
         self.system, self.x, self.newton = system, x, newton
         self.beta = 0.0
         self.size, self.before = np.inf, np.inf  # of the last update, and of the one before
-        random = np.random.default_rng(20240501)
-        phi = _orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
-        psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
-        # borders of random numbers first, then of the kernel itself: the best conditioned
-        matrix = BorderedMatrix(system, x, phi, psi)
-        if not np.isfinite(matrix.kernel).all():
-            raise ConvergenceError("no branch point near by: the bordered matrix is singular")
-        self._borders = _orthonormal(system, matrix.kernel), matrix.left()
+        self._borders = borders_at(system, x, kernel)
         self._hessian: Array | None = None
         self._slope: Array = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
         self._drop: Array = np.zeros(2)  # the last update along the kernel
@@ -301,21 +293,10 @@ class _Search:
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
         tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
         tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]
-        kernel = _orthonormal(system, matrix.kernel)
+        kernel = orthonormal(system, matrix.kernel)
         change = np.linalg.inv([[inner(system, old, new) for new in kernel] for old in matrix.kernel])  # new = change @ old
         hessian = change @ hessian @ change.T
         return BranchPoint(self.x, tuple(tangents), kernel, matrix.left(), hessian, float(abs(self.beta)))
-
-
-def _orthonormal(system: Discretization, vectors: Iterable[Array]) -> Array:
-    """Return vectors as rows made orthonormal in the weighted inner product: Gram-Schmidt, twice."""
-    result: list[Array] = []
-    for vector in vectors:
-        for _ in range(2):
-            for other in result:
-                vector = vector - inner(system, vector, other) * other
-        result.append(vector / np.sqrt(inner(system, vector, vector)))
-    return np.array(result)
 
 
 def _null_directions(hessian: Array) -> list[Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -65,3 +66,7 @@ class Coefficient(NamedTuple):
         Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
         """
         return abs(self.value) < _CANCELLED * self.size + _ZERO
+
+
+#: Where nothing is known: at the ends of curves, and where it is infinite.
+UNKNOWN = Coefficient(math.nan, math.nan, math.nan)

@@ -24,6 +24,7 @@ from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
+from contin.linalg.border import FITS
 
 
 class Stationarity:
@@ -73,6 +74,11 @@ class Stationarity:
         """Return the derivative of G_x - F_x^T lambda along v, shape (size,)."""
         return self._system.column_bent(self._x, self._column, v) - self._system.bent(self._x, self.multipliers, v)
 
+    @property
+    def fits(self) -> bool:
+        """Whether the tangents have not turned away from the rows Phi."""
+        return fits(self.kernel, self._system.weights)
+
     def orthonormal(self) -> Array:
         """Return an orthonormal basis of the tangents, shape (j, size), in the inner product of the system."""
         return orthonormal(self.kernel, self._system.weights)
@@ -89,6 +95,12 @@ def orthonormal(vectors: Array, weights: Array) -> Array:
     root = np.sqrt(weights)
     basis: Array = np.linalg.qr((vectors * root).T)[0].T / root
     return np.ascontiguousarray(basis)
+
+
+def fits(tangents: Array, weights: Array) -> bool:
+    """Return whether tangents have not turned away from orthonormal rows that have the product 1 with them."""
+    longest = np.sqrt((weights * tangents**2).sum(axis=1).max())  # 1 where each lies along its row
+    return not 1 / longest < FITS
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:

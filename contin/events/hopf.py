@@ -19,6 +19,7 @@ from contin.arrays import Array, ComplexArray, Indices
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
+from contin.events.normal_forms import pair
 from contin.events.root import find_zero
 
 #: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
@@ -49,7 +50,7 @@ def hopf() -> Event:
         parts = values[_is_complex(values)].real
         return float(parts.max()) if parts.size else float("nan")
 
-    return Event("HB", "Hopf", function, search=hopf_points, asks=may_pass)
+    return Event("HB", "Hopf", function, search=hopf_points, asks=may_pass, normal_form=pair)
 
 
 def may_pass(arc: Arc) -> bool:
@@ -69,7 +70,7 @@ def _nearest(value: complex) -> Event:
         values = _upper(trial)
         return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
-    return Event("HB", "Hopf", function, search=hopf_points)
+    return Event("HB", "Hopf", function, search=hopf_points, normal_form=pair)
 
 
 def _upper(trial: Trial) -> ComplexArray:

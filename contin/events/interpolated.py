@@ -22,11 +22,11 @@ from contin.arrays import Array
 from contin.collocation.basis import interpolation
 from contin.core.newton import Newton, rounded_off
 from contin.core.protocol import Carrier, Discretization, inner
-from contin.core.state import State, standing_at
+from contin.core.state import Reason, State, Stop, standing_at
 from contin.core.step import located
-from contin.core.trial import Linearization, Trial
+from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
-from contin.events.arc import Arc
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import Finding
 from contin.events.root import find_zero
 
@@ -39,6 +39,8 @@ _WIDTHS = (2.0, 1.0, 0.5, 0.25)
 _BEHIND, _FEWEST = 6, 2
 #: At the zero of the first test function the others are below this part of their largest value.
 _TOGETHER = 1e-3
+#: Parameters turn at a point where their part of the unit tangent is below this: interpolated tangents are better known.
+_TURNS = 1e-4
 
 #: Functions of a trial point.
 Functions = Sequence[Callable[[Trial], float]]
@@ -137,6 +139,26 @@ def interpolated_zero(arc: Arc, functions: Functions, near: float) -> Interpolat
             break
         best, least = found, change
     return best
+
+
+def meeting(arc: Arc, test: Event, functions: Functions, small: float, stops: str) -> list[SpecialPoint] | None:
+    """Return the point inside a step where two functions vanish together, in a list; None where there is none.
+
+    The first one changes its sign there; the other's first estimate there is not larger than ``small``. Where the parameters
+    stand still there, the curve goes back as its mirror image: the run ends, and ``stops`` says why.
+    """
+    a, b = functions[0](arc.before), functions[0](arc.trial)
+    if not a * b < 0:
+        return None
+    near = arc.low + (arc.step - arc.low) * a / (a - b)
+    if abs(functions[1](arc.guessed(near))) > small:
+        return None
+    found = interpolated_zero(arc, functions, near)
+    if found is None:
+        return None
+    turns_back = np.abs(found.trial.tangent[arc.state.system.state_size :]).max() < _TURNS
+    stop = Stop(Reason.PITCHFORK, stops) if turns_back else None
+    return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
 
 
 def _around(arc: Arc, window: Window, functions: Functions) -> InterpolatedZero:

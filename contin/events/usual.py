@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from contin.core.trial import Event, Trial
+from contin.events import normal_forms
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.names import value_names
@@ -64,7 +65,8 @@ def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -
 
 def fold(name: str) -> Event:
     """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
-    return Event("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name)
+    return Event("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name,
+                 normal_form=normal_forms.fold)  # fmt: skip
 
 
 def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:

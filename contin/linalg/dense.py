@@ -53,7 +53,7 @@ def eigenvalues(matrix: Array) -> ComplexArray:
 
 
 class DenseFactors:
-    """LU of a dense matrix, with partial pivoting: `Factors` of small systems.
+    """LU of a dense matrix, real or complex, with partial pivoting: `Factors` of small systems.
 
     Parameters
     ----------
@@ -76,10 +76,11 @@ class DenseFactors:
             raise ValueError(f"a matrix of {matrix.shape[0]} rows and {matrix.shape[1]} columns is not square")
         #: The matrix itself.
         self.matrix = matrix
-        self._lu, self._exchanges, zero_pivot = _lapack().dgetrf(matrix)
+        self._is_complex = np.iscomplexobj(matrix)
+        self._lu, self._exchanges, zero_pivot = (_lapack().zgetrf if self._is_complex else _lapack().dgetrf)(matrix)
         self._singular = zero_pivot > 0
-        #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite.
-        self.sign = self._sign() if np.isfinite(matrix).all() else np.nan
+        #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite or complex.
+        self.sign = self._sign() if not self._is_complex and np.isfinite(matrix).all() else np.nan
 
     def _sign(self) -> float:
         """Return the sign of the product of the pivots, times -1 for each exchange of rows."""
@@ -107,4 +108,5 @@ class DenseFactors:
         b = np.asarray(b)
         if self._singular:
             return np.full(b.shape, np.nan)
-        return np.ascontiguousarray(_lapack().dgetrs(self._lu, self._exchanges, b.T, trans=transposed)[0].T)
+        solve = _lapack().zgetrs if self._is_complex else _lapack().dgetrs
+        return np.ascontiguousarray(solve(self._lu, self._exchanges, b.T, trans=transposed)[0].T)

@@ -123,9 +123,9 @@ class Point(Record):
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
-        period doubling c and at a torus bifurcation Re d of `contin.cycles.normal_forms`; at a fold of cycles |b|,
-        which is zero at a cusp. Those of maps are in `contin.cycles.map_normal_forms`; the c of their period doublings is
-        positive where they are supercritical. Its estimated error is ``details["normal_form_error"]``.
+        period doubling c and at a torus bifurcation Re d of `contin.events.normal_forms`; at a fold of cycles |b|, zero
+        at a cusp. The c of period doublings of maps is positive where they are supercritical. Its estimated error is
+        ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
 

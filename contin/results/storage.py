@@ -132,7 +132,7 @@ def _arrays_of(system: Any, number: int) -> dict[str, Array]:
 
 
 def _curves(base: Discretization) -> dict[str, Any]:
-    """Return the extended systems of curves of solutions of a problem that are stored, by the label of their points."""
+    """Return the defining systems of curves of solutions of a problem that are stored, by the label of their points."""
     return {**{kind.kind: kind for kind in (FoldCurve, BranchPointCurve)}, **base.curves}
 
 
@@ -229,7 +229,7 @@ def _system(problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, An
     if not head["curves"]:
         return base
     kind, size = head["curves"][i]
-    found: System = _curves(base)[kind].of_size(base, size)
+    found: System = _curves(base)[kind](base, size)
     return found
 
 

@@ -6,7 +6,7 @@ singular, and homoclinic orbits at Bogdanov-Takens points likewise. Their first 
 corrected with its size held, and the curve goes on from there to larger ones.
 
 A cycle of amplitude r beside a Hopf point is u = u0 + r Re(q exp(2 pi i t)), with parameters that differ by O(r^2). The cosine
-of the angle of its multipliers, of which the extended system needs a first value, is taken from this guess as it is. At a
+of the angle of its multipliers, of which the defining system needs a first value, is taken from this guess as it is. At a
 zero-Hopf point the angle is O(r), and it may be imaginary: then no torus bifurcations begin there.
 """
 
@@ -22,8 +22,8 @@ from contin.core.newton import correct
 from contin.core.protocol import Discretization
 from contin.core.trial import linearization
 from contin.cycles.curves import TorusCurve
-from contin.defining.extended import Extended
 from contin.defining.fold_curve import FoldCurve
+from contin.defining.system import Defining
 from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import critical_pair
 from contin.equilibria.system import Algebraic
@@ -114,7 +114,7 @@ def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float |
     for amplitude in _AMPLITUDES:
         size = amplitude * (1 + float(np.abs(base.states(x)).max()))
         cycles, y, tangent = small_cycle(base, x, pair, size)
-        curve: Extended = FoldCurve(cycles)
+        curve: Defining = FoldCurve(cycles)
         if other is not None:
             angle = _angle(cycles.eigenvalues(y), 2 * math.pi * other / frequency)
             curve, y, tangent = TorusCurve(cycles), np.append(y, math.cos(angle)), np.append(tangent, 0.0)

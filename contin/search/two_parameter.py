@@ -18,9 +18,9 @@ from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.branch_point_curve import BranchPointCurve
 from contin.defining.event_curve import EventCurve
-from contin.defining.extended import Extended
 from contin.defining.extremum_curve import ExtremumCurve
 from contin.defining.fold_curve import FoldCurve
+from contin.defining.system import Defining
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
@@ -136,12 +136,12 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
     return (pair[0], *others, pair[1])
 
 
-#: An extended system, and its first vector of unknowns.
-_First = tuple[Extended, Array]
+#: A defining system, and its first vector of unknowns.
+_First = tuple[Defining, Array]
 
 
 def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hold: str | None) -> _First:
-    """Return the extended system of the kind of a point.
+    """Return the defining system of the kind of a point.
 
     Raises
     ------
@@ -242,7 +242,7 @@ def _event(start: Point, base: Any, x: Array, event: Event) -> _First:
         It is no zero of that.
     """
     found = EventCurve(base, event.function)
-    here, slope = found.value(x), found.gradient(x)
+    here, slope = found.value(x), found.own_gradients(x)[0]
     if not abs(here) <= _LOCATED * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
         raise ProblemError(f"event: {event.name!r} is {here:.6g} at the start; it must be the function that labelled it")
     return found, x

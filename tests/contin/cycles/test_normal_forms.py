@@ -9,7 +9,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem
-from contin.cycles.normal_forms import NormalForms
+from contin.events.normal_forms import coefficient, pair
 
 
 def circle(u, p):
@@ -201,7 +201,7 @@ def test_of_a_torus_bifurcation_of_sixteen_states():
     expected = 2 * (-1 + given["k"] * given["h"] / 2)
     assert abs(point.normal_form - expected) <= point.details["normal_form_error"] < 1e-9
     tracemalloc.start()
-    NormalForms(point.system, point.x).torus(point.details["frequency"])
+    coefficient(point.system, point.x, pair, point.details["frequency"])
     assert tracemalloc.get_traced_memory()[1] < 15e6
     tracemalloc.stop()
 

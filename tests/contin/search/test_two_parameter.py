@@ -73,7 +73,7 @@ def test_fold_meets_a_branch_point():
 
 
 def test_a_curve_of_folds_ends_at_a_pitchfork():
-    """x (mu + a x^2 - x^4) = 0: folds at a = 2 x^2, mu = -x^4. At x = 0 the extended system is singular."""
+    """x (mu + a x^2 - x^4) = 0: folds at a = 2 x^2, mu = -x^4. At x = 0 the defining system is singular."""
     problem = AlgebraicProblem(lambda u, p: (u.x * (p.mu + p.a * u.x**2 - u.x**4),), ["x"], {"mu": 0.0, "a": 1.0})
     fold = trace(solve(problem, [1.0]), free=["mu"], direction=-1, limits={"mu": (-3, 3)}).labelled("LP")[0]
     found = curve(fold, "a", direction=-1, limits={"a": (-2, 2)})
@@ -99,7 +99,7 @@ def test_a_curve_of_folds_ends_at_the_pitchfork_of_a_boundary_value_problem():
 
 
 def test_a_curve_of_folds_goes_through_a_transcritical_bifurcation():
-    """x (mu + a x - x^2) = 0: folds at mu = -x^2, a = 2 x; at x = 0 the extended system is singular."""
+    """x (mu + a x - x^2) = 0: folds at mu = -x^2, a = 2 x; at x = 0 the defining system is singular."""
     problem = AlgebraicProblem(lambda u, p: (u.x * (p.mu + p.a * u.x - u.x**2),), ["x"], {"mu": 1.0, "a": 1.0})
     fold = trace(solve(problem, [1.5]), free=["mu"], direction=-1, limits={"mu": (-3, 3)}).labelled("LP")[0]
     found = curve(fold, "a", direction=-1, limits={"a": (-2, 2)})

@@ -1,0 +1,342 @@
+"""Defining systems: a discretized problem with further equations g = 0, for which its special points are solutions.
+
+With y the unknowns of the underlying system, which has one free parameter more than a curve of its solutions needs, and z those
+that the curve adds, the equations and the matrix of a step are
+
+                                          y      z
+        F(y) + psi z = 0               [ F_y    psi ]   N equations of the underlying system
+        g(y, z)      = 0               [ g_y    g_z ]   k equations of the curve
+                                       [  row       ]   along the curve
+
+Folds, branch points, critical eigenvalues and multipliers, extrema, and zeros of any event differ in g alone. What that is made
+of is computed once at each point. They follow the protocol of the system that they extend: the same loop continues them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, Function
+from contin.collocation.mesh import MeshControl
+from contin.collocation.switching import Switching
+from contin.core.protocol import Carrier, Discretization
+from contin.core.system import System
+from contin.core.trial import Event, Trial
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.linalg.factors import Factors
+from contin.problems.statement import Statement, multipliers_of, phases_of
+from contin.problems.vector_field import found_elsewhere
+
+#: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
+#: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
+_SHRUNK = 0.1
+
+
+class Defining(Discretization):
+    """A defining system: names and columns are those of the underlying system ``base``.
+
+    Parameters
+    ----------
+    base : System
+        Or a defining system: it has what is used of a system here.
+    size : float
+        Of the unknowns that the curve adds, by which they are divided in x.
+
+    Attributes
+    ----------
+    kind : str
+        The letters of the special points that the curve consists of.
+    own_equations, own_unknowns : int
+        k and the number of unknowns z.
+    own_columns : tuple of str
+        Names of columns beyond those of ``base``.
+
+    Raises
+    ------
+    ProblemError
+        The problem has a column of such a name.
+    """
+
+    kind = ""
+    own_equations, own_unknowns = 1, 0
+    own_columns: tuple[str, ...] = ()
+    #: The column of extrema that the curve consists of.
+    objective = ""
+
+    @property
+    def stationary(self) -> str:
+        """The column that is stationary at the points of the curve, among all solutions beside them; "" where there is none."""
+        return self.objective
+
+    def __init__(self, base: System, size: float = 1.0) -> None:
+        for name in self.own_columns:
+            if name in base.problem.parameters or name in base.problem.functionals:
+                raise ProblemError(f"start: its problem has a column {name!r}, which is one of the curve; give it another name")
+        self.base, self.kappa_size = base, size
+        self.problem, self.free = _Statement(base.problem, len(base.free), self.own_columns), base.free
+        self.size, self.equations = base.size + self.own_unknowns, base.equations + self.own_equations
+        self.weights, self.state_size = np.append(base.weights, np.ones(self.own_unknowns)), base.state_size
+        self.intervals, self.degree = base.intervals, base.degree
+        self.scales, self.free_scales = base.scales, base.free_scales
+        #: What borders the singular matrix: about its null vectors. Made when first needed, renewed where they have turned.
+        self.borders: Any = None
+        self._known: tuple[bytes, Any] = b"", None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all but what is computed when it is first asked for."""
+        return {**vars(self), "_known": (b"", None)}
+
+    def on(self, base: System) -> Defining:
+        """Return the defining system of another underlying one."""
+        return type(self)(base, self.kappa_size)
+
+    # --- what a kind of curve states -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def computed(self, x: Array) -> Any:
+        """Return what the own equations are made of."""
+
+    @abstractmethod
+    def own_values(self, x: Array) -> Array:
+        """Return g, shape (k,)."""
+
+    @abstractmethod
+    def own_gradients(self, x: Array) -> Array:
+        """Return the derivatives of g by x, shape (k, size)."""
+
+    def own_vectors(self, x: Array) -> Array:
+        """Return psi, shape (own unknowns, equations of F)."""
+        return np.zeros((self.own_unknowns, self.base.equations))
+
+    # --- the equations ---------------------------------------------------------------------------------------------------
+
+    def at(self, x: Array) -> Any:
+        """Return what the own equations are made of at x, computed once."""
+        key = x.tobytes()
+        if self._known[0] != key:
+            self._known = key, self.computed(x)
+        return self._known[1]
+
+    def inside(self, x: Array) -> Array:
+        """Return the unknowns of the underlying system."""
+        return x[: self.base.size]
+
+    def residual(self, x: Array) -> Array:
+        """Return F + psi z, and g."""
+        return self._residual(x, self.base.residual(self.inside(x)))
+
+    def _residual(self, x: Array, inside: Array) -> Array:
+        further = x[self.base.size :] @ self.own_vectors(x) if self.own_unknowns else 0.0
+        return np.append(inside + further, self.own_values(x))
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual, and the factored bordered matrix: the gradients of g come first among its rows."""
+        wide, count = self.size + len(columns), self.own_equations
+        rows = np.array(rows, dtype=float).reshape(-1, wide)
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        top = np.hstack([self.own_gradients(x), columns[:, -count:].T])
+        beside = np.vstack([self.own_vectors(x), columns[:, :-count]])
+        residual, factors = self.base.linearize(self.inside(x), np.vstack([top, rows]), beside)
+        return self._residual(x, residual), factors
+
+    def events(self) -> list[Event]:
+        """Return that of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
+
+        At the equilibrium the equations of the curve are singular, so the run ends a little before. Other solutions do not
+        shrink.
+        """
+
+        def amplitude(trial: Trial) -> float:
+            system: Any = trial.system
+            return float(system.base.amplitude(system.inside(trial.x))) - _SHRUNK
+
+        name = "the end, near a Hopf point where the cycles have no size"
+        return [Event("EP", name, amplitude, terminal=True)] if self.base.size_of_solutions is not None else []
+
+    @property
+    def nodes(self) -> Array:
+        """Nodes of the underlying system."""
+        return self.base.nodes
+
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states that are columns of the underlying system."""
+        return self.base.named_states
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of the solution and the parameters; that of the singular vectors is not in it."""
+        inside: Any = _Inside(factors, self)
+        return self.base.discretization_error(self.inside(x), inside, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return that of the underlying system."""
+        inside: Any = _Inside(factors, self)
+        return self.base.newton_error(self.inside(x), inside)
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with the angles of the underlying system moved by whole rounds, nearest to those of a reference."""
+        size = self.base.size
+        return np.append(self.base.lifted(x[:size], reference[:size]), x[size:])
+
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return those of the underlying system, along the curve's own equations."""
+        inside: Any = _Inside(factors, self)
+        return self.base.cut_off_errors(self.inside(x), inside)
+
+    def states(self, x: Array) -> Array:
+        """Return the states of the underlying system."""
+        return self.base.states(self.inside(x))
+
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """Return the states of the underlying boundary value problem at ``times`` (m,), shape (m, n)."""
+        base: Any = self.base
+        states: Array = base.evaluate(x[: base.size], times)
+        return states
+
+    def all_parameters(self, x: Array) -> Array:
+        """Return the values of all parameters."""
+        return self.base.all_parameters(self.inside(x))
+
+    def parameter(self, x: Array, name: str) -> float:
+        """Return the value of one parameter."""
+        return self.base.parameter(self.inside(x), name)
+
+    def parameter_index(self, name: str) -> int:
+        """Return the place of the free parameter ``name`` in x."""
+        return self.base.parameter_index(name)
+
+    def functionals(self, x: Array) -> Array:
+        """Return the functionals of the underlying problem."""
+        return self.base.functionals(self.inside(x))
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a column of the underlying problem by x; None where they are not known."""
+        inside = self.base.column_gradient(self.inside(x), name)
+        return None if inside is None else np.append(inside, np.zeros(self.size - self.base.size))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Defining, Array]:
+        """Return the defining system with other free parameters (values from x), and x for it."""
+        base, inside = self.base.with_free(free, self.inside(x))
+        return self.on(base), np.append(inside, x[self.base.size :])
+
+    def carrier(self, other: Any) -> Carrier:
+        """Return the carrier of the underlying system's unknowns; it leaves the others as they are."""
+        inside, size = self.base.carrier(other.base), self.base.size
+        return lambda x: np.concatenate([inside(x[:size]), x[size:]])
+
+    def refined(self) -> tuple[Defining, Carrier] | None:
+        """Return the defining system on every interval halved, and the carrier."""
+        return self._moved(self.base.refined())
+
+    def switching(self, x: Array) -> Switching:
+        """Return where conditions switch along the solution of the underlying system."""
+        return self.base.switching(self.inside(x))
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[Defining, Carrier] | None:
+        """Return the defining system on a mesh with those places among its points, and the carrier."""
+        return self._moved(self.base.on_switches(self.inside(x), closely))
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Defining, Carrier] | None:
+        """Return the defining system on a better mesh, and the carrier."""
+        return self._moved(self.base.adapted(self.inside(x), control))
+
+    def _moved(self, changed: tuple[System, Carrier] | None) -> tuple[Defining, Carrier] | None:
+        if changed is None:
+            return None
+        other = self.on(changed[0])
+        return other, self.carrier(other)
+
+    # --- what is known of the solutions themselves: the unknowns that the curve adds are their own -----------------------
+
+    @property
+    def solution(self) -> Discretization:
+        """The problem whose solutions are followed."""
+        return self.base.solution
+
+    def referring_to(self, x: Array, tangent: Array) -> Defining:
+        """Return the same with the solution itself as the reference."""
+        size, base = self.base.size, self.base
+        found: Any = base.referring_to(x[:size], tangent[:size])
+        return self if found is base else self.on(found)
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return the solution itself, and vectors, in phase."""
+        size = self.base.size
+        inside, others = self.base.in_phase(x[:size], [vector[:size] for vector in vectors], reference[:size])
+        return np.append(inside, x[size:]), [np.append(other, vector[size:]) for other, vector in zip(others, vectors)]
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether the solution itself has no size."""
+        return self.base.collapsed(self.inside(x), z[: self.base.size])
+
+
+class _Inside:
+    """Factors of a defining system for right-hand sides of the underlying one: its own equations hold."""
+
+    def __init__(self, factors: Factors, system: Defining) -> None:
+        self._factors, self._system = factors, system
+
+    def solve(self, b: Array) -> Array:
+        """Return the unknowns of the underlying system."""
+        base = self._system.base
+        wide = np.zeros((*b.shape[:-1], self._system.equations + 1))
+        wide[..., : base.equations], wide[..., -1] = b[..., :-1], b[..., -1]
+        found: Array = self._factors.solve(wide)[..., : base.size]
+        return found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Statement:
+    """The statement behind a defining system: that of the problem, but for the number of free parameters."""
+
+    problem: Statement
+    free_size: int
+    columns: tuple[str, ...] = ()
+
+    @property
+    def states(self) -> Any:
+        """Names of the states."""
+        return self.problem.states
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Parameters of the problem."""
+        return self.problem.parameters
+
+    @property
+    def functionals(self) -> Mapping[str, Function]:
+        """Functionals of the problem, and columns of the curve."""
+        return {**self.problem.functionals, **dict.fromkeys(self.columns, found_elsewhere)}
+
+    @property
+    def multipliers(self) -> tuple[str, ...]:
+        """Those of the problem."""
+        return multipliers_of(self.problem)
+
+    @property
+    def angles(self) -> Mapping[str, float]:
+        """Those of the problem."""
+        found: Mapping[str, float] = self.problem.angles
+        return found
+
+    @property
+    def symmetries(self) -> Mapping[str, Any]:
+        """None: images are of solutions."""
+        return {}
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Those of the problem."""
+        return phases_of(self.problem)
+
+    def batch(self, name: str) -> Batch:
+        """Return functions of the problem, compiled."""
+        return self.problem.batch(name)

@@ -1,0 +1,229 @@
+"""Normal forms of equilibria, of cycles and of cycles of maps (Kuznetsov, Elements of Applied Bifurcation Theory).
+
+Perturbations that are multiplied by exp(rate t), or in a round by mu = exp(rate), are the null vectors of a characteristic
+matrix L(rate). With the forms B and C, the derivatives of second and third order, a coordinate xi of the centre manifold obeys
+
+    fold      xi' = b xi^2              L(0) v = 0:        b = w.B(v, v) / 2
+    flip      -xi + c xi^3              L(pi i) v = 0:     c = w.[ C(v, v, v) + 3 B(v, h) ] / 6,  L(0) h = B(v, v)
+    pair      xi' = d xi |xi|^2 + ...   L(i omega) v = 0:  d = w.[ C(v, v, v*) + 2 B(v, h) + B(v*, k) ] / 2,
+                                                           L(0) h = B(v, v*),  L(2 i omega) k = B(v, v)
+
+with w L = 0 and w.v = 1, times a number for the unit of time. The first Lyapunov coefficient of a Hopf point is Re d / omega.
+What the matrix and the forms are, a `Form` states for each kind of solution. Unknowns of a cycle are its states and its period,
+T (1 + stretch): B(v, h) has the terms stretch(h) (J - rate) v and stretch(v) J h besides (Kuznetsov, Govaerts, Doedel & Dhooge
+2005), where L(0) leaves out the multiplier that is always one.
+
+Where c or the real part of d is negative, the bifurcation is supercritical: what branches off attracts on the centre manifold;
+at period doublings of maps where c is positive. The sign of b depends on that of v, and its absolute value is given; it
+vanishes at a cusp.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.core.multilinear import of_complex
+from contin.core.system import System
+from contin.events.arc import SpecialPoint
+from contin.events.coefficient import Coefficient
+from contin.linalg.border import Bordered, Borders, Solves, null_vectors
+from contin.linalg.dense import DenseFactors
+from contin.linalg.orientation import oriented
+
+
+class Direction(NamedTuple):
+    """A direction at all places where the forms are evaluated, and the change of the period along it, as a part of that."""
+
+    states: Any
+    stretch: float = 0.0
+
+
+class Form(ABC):
+    """The characteristic matrix at a solution, L(P) for copies of the unknowns that a small matrix P couples, and the forms.
+
+    Attributes
+    ----------
+    places : ndarray of int
+        Where the unknowns of one copy stand in x.
+    equations : int
+        Number of equations of one copy, which come first in F.
+    weights : ndarray
+        Of the unknowns of one copy.
+    doubled_side : int
+        Sign of the coefficient of a subcritical period doubling.
+    """
+
+    places: Indices
+    equations: int
+    weights: Array
+    doubled_side = 1
+
+    @property
+    def reduced(self) -> Form:
+        """The same without the multiplier that is 1 along every autonomous cycle."""
+        return self
+
+    @abstractmethod
+    def solver(self, coupling: Any, border: Borders | None = None) -> Solves:
+        """Return the solver of L(P), bordered in each copy where a border is given: [copies | columns of all copies]."""
+
+    @abstractmethod
+    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+        """Return the parts of w and v (..., unknowns) whose product is w.E v, where L(P) depends on P by -P E."""
+
+    def coupled(self, left: Array, right: Array) -> Any:
+        """Return w.E v."""
+        one, other = self.coupled_parts(left, right)
+        return (one * other).sum(axis=-1)
+
+    @abstractmethod
+    def coupling(self, rate: complex) -> Any:
+        """Return the number P of perturbations with this rate."""
+
+    @abstractmethod
+    def unit(self, rate: complex) -> complex:
+        """Return what the coefficient is multiplied by."""
+
+    @abstractmethod
+    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+        """Return w and v from null vectors, with v of unit length, w.v = 1, and at folds v across the solution itself."""
+
+    @abstractmethod
+    def solve(self, rate: complex, values: Any) -> Direction:
+        """Return the h with L h = values, which are given where the forms are evaluated."""
+
+    @abstractmethod
+    def along(self, *directions: Any) -> Any:
+        """Return B or C along real or complex directions."""
+
+    @abstractmethod
+    def product(self, left: Any, values: Any) -> complex:
+        """Return w.values."""
+
+    def along_time(self, states: Any) -> Any:
+        """Return J v: what B(v, h) grows by with the stretch of h."""
+        return np.zeros_like(states)
+
+    def critical(self, rate: complex) -> tuple[Any, Direction]:
+        """Return the null vectors w and v of L(rate)."""
+        coupling, size = self.coupling(rate), len(self.places)
+
+        def bordered(b: Array, c: Array) -> Bordered:
+            return Bordered(self.solver(coupling, (b, c)), (self.equations, size))
+
+        found, _ = null_vectors(bordered, (self.equations, size))
+        return self.normalized(found.left[0], found.right[0])
+
+
+class DenseForm(Form):
+    """One whose matrix is open - P E, with E one where ``places`` of the last equations meet those of the first unknowns.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (size, size)
+        ``open``.
+    count : int
+        Number of rows of E that are not zero.
+    along : callable
+        ``along(stacks)`` returns B or C along several stacks of real directions.
+    weights : ndarray, shape (size,)
+    """
+
+    def __init__(self, matrix: Array, count: int, along: Callable[[Any], Array], weights: Array) -> None:
+        size = self.equations = len(matrix)
+        self._open, self._along, self._count, self.weights, self.places = matrix, along, count, weights, np.arange(size)
+
+    def solver(self, coupling: Any, border: Borders | None = None) -> DenseFactors:
+        """Return LU factors of L(P)."""
+        small, size, n = np.atleast_2d(coupling), self.equations, self._count
+        every, closing = np.eye(len(small)), np.zeros((size, size))
+        closing[size - n :, :n] = np.eye(n)
+        matrix: Any = np.kron(every, self._open) - np.kron(small, closing)
+        if border is not None:
+            (b, c), none = border, np.zeros_like(every)
+            matrix = np.block([[matrix, np.kron(every, b[:, None])], [np.kron(every, c[None, :]), none]])
+        return DenseFactors(matrix)
+
+    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+        """Return the last equations of w and the first unknowns of v."""
+        return left[..., self.equations - self._count :], right[..., : self._count]
+
+    def solve(self, rate: complex, values: Any) -> Direction:
+        """Return the h with -L h = values."""
+        coupling = self.coupling(rate)
+        return Direction(self.solver(np.asarray(coupling, np.result_type(coupling, values))).solve(-values))
+
+    def along(self, *directions: Any) -> Any:
+        """Return B or C along real or complex directions."""
+        return of_complex(self._along, directions)
+
+    def product(self, left: Any, values: Any) -> complex:
+        """Return w.values."""
+        return complex(left @ values)
+
+    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+        """Return w and v, with v of unit length in the first unknowns, and `oriented`."""
+        v = oriented(right / self.length(right))
+        return left / self.coupled(left, v), Direction(v)
+
+    def length(self, right: Any) -> float:
+        """Return the length of v."""
+        return float(np.linalg.norm(right[: self._count]))
+
+
+#: Terms of a coefficient.
+Terms = Callable[[Form], Array]
+
+
+def fold(form: Form) -> Array:
+    """Return the terms of b."""
+    form = form.reduced
+    w, (v, stretch) = form.critical(0.0)
+    return _terms(form, 0.0, w, (form.along(v, v), 2 * stretch * form.along_time(v)), 2)
+
+
+def flip(form: Form) -> Array:
+    """Return the terms of c."""
+    w, (v, _) = form.critical(1j * math.pi)
+    h, stretch = form.reduced.solve(0.0, form.along(v, v))
+    return _terms(form, 0.0, w, (form.along(v, v, v), 3 * form.along(v, h), 3 * stretch * form.along_time(v)), 6)
+
+
+def pair(form: Form, frequency: float) -> Array:
+    """Return the terms of the real part of d."""
+    rate = 1j * frequency
+    w, (v, _) = form.critical(rate)
+    h, stretch = form.reduced.solve(0.0, form.along(v, v.conj()).real)
+    k, _ = form.solve(2 * rate, form.along(v, v))
+    terms = form.along(v, v, v.conj()), 2 * form.along(v, h), form.along(v.conj(), k)
+    return _terms(form, rate, w, (*terms, 2 * stretch * (form.along_time(v) - rate * v)), 2)
+
+
+def _terms(form: Form, rate: complex, w: Any, terms: tuple[Any, ...], factor: int) -> Array:
+    return np.array([(form.unit(rate) * form.product(w, term)).real for term in terms]) / factor
+
+
+def coefficient(system: System, x: Array, terms: Callable[..., Array], *frequency: float) -> Coefficient:
+    """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite."""
+    with np.errstate(all="ignore"):
+        here = system.form(x)
+        found = Coefficient.of(lambda point: terms(here if point is x else system.form(point), *frequency), x, system)
+    if terms is fold:
+        return Coefficient(abs(found.value), found.error, found.size)
+    return found._replace(side=here.doubled_side) if terms is flip else found
+
+
+def at_special_point(system: System, point: SpecialPoint) -> Coefficient | None:
+    """Return the coefficient at a fold, or where one multiplier or pair is critical; None at other special points."""
+    terms = None if point.test is None else point.test.normal_form
+    if terms is fold:
+        return coefficient(system, point.trial.x, fold) if point.details is None and point.is_located else None
+    if terms is None or not point.is_simple:
+        return None
+    return coefficient(system, point.trial.x, terms, *([point.details["frequency"]] if terms is pair else []))
