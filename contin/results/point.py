@@ -142,6 +142,7 @@ class Point(Record):
         own = curve.kind if self.label != "HH" else ""
         return tuple(kind for kind in curve.base.leaving.get(self.label, ()) if kind != own)
 
+    @checks.arguments
     def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
         """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
 
@@ -177,6 +178,7 @@ class Point(Record):
         """
         return portrait.plot(underlying(self), what, states, axes)
 
+    @checks.arguments
     def sensitivities(
         self, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
     ) -> dict[str, dict[str, float]]:
@@ -217,6 +219,7 @@ class Point(Record):
         checks.instance("point", self, Point, "a Point")  # of `contin.sensitivities`, as it was called in version 0.2
         return sensitivities(self, by, held)
 
+    @checks.arguments
     def segment(self, index: int) -> Profile:
         """Return the solution on one segment of a `SegmentedProblem`, over its own coordinate; segments count from 0.
 
