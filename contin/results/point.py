@@ -16,6 +16,7 @@ from contin.core.protocol import Discretization
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
 from contin.errors import ProblemError
+from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
@@ -243,6 +244,47 @@ class Point(Record):
         """
         return Profile(underlying(self), index)
 
+    @checks.arguments
+    def error(self, functional: str | Callable[[Trial], float]) -> float:
+        """Return the estimated error of a column, or of a function of the solution: all of it.
+
+        That is what halving the mesh changes, what Newton's method and round-off left, and at special points what the column
+        changes over the distance that their place is known to.
+
+        Parameters
+        ----------
+        functional : str or callable
+            A parameter, a functional, a state of an equilibrium, or ``functional(trial)``.
+
+        Returns
+        -------
+        float
+            NaN where the point is not found again.
+
+        Raises
+        ------
+        ProblemError
+            There is no such column.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> bratu = contin.BoundaryValueProblem(
+        ...     lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 1.0},
+        ...     functionals={"mean": lambda t, u, p: u.u},
+        ... )
+        >>> point = contin.solve(bratu, [0, 0], intervals=4, degree=3)
+        >>> exact = contin.solve(bratu, [0, 0], intervals=40)
+        >>> abs(point["mean"] - exact["mean"]) < point.error("mean") < 1e-6
+        True
+        """
+        if callable(functional):
+            return float(error(self, functional))
+        known = (*self.parameters, *self.functionals, *self.system.named_states)
+        if functional not in known:
+            raise ProblemError(f"functional: {checks.shown(functional)} is no column; there are {checks.listed(known)}")
+        return float(error(self, lambda trial: trial[functional]))
+
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.
 
@@ -286,8 +328,8 @@ class Point(Record):
         >>> {name: round(load, 9) for name, load in contin.solve(string, [0.0]).phase_loads().items()}
         {'mu_place': -1.0}
         """
-        error = self.newton_error + float(np.nan_to_num(self.discretization_error))
-        return {name: load for name, load, _ in phase_loads(self.system, self.x, (), error)}
+        left = self.newton_error + float(np.nan_to_num(self.discretization_error))
+        return {name: load for name, load, _ in phase_loads(self.system, self.x, (), left)}
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.
