@@ -158,8 +158,8 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     def checked(*given: _Given.args, **named: _Given.kwargs) -> _Result:
         hints, names = _annotations(function)
         for name, value in (*zip(names, given), *named.items()):
-            if not _fits(value, hints.get(name, Any)):
-                raise ProblemError(f"{name}: {shown(value)} must be {_words(hints[name])}")
+            if said := _refusal(name, value, hints.get(name, Any)):
+                raise ProblemError(said)
         return function(*given, **named)
 
     return checked
@@ -169,8 +169,8 @@ def fields(record: Any) -> None:
     """Require that the fields of a dataclass are what their annotations say."""
     hints, _ = _annotations(cast(Any, type(record)))
     for name, kind in hints.items():
-        if not _fits(getattr(record, name), kind):
-            raise ProblemError(f"{name}: {shown(getattr(record, name))} must be {_words(kind)}")
+        if said := _refusal(name, getattr(record, name), kind):
+            raise ProblemError(said)
 
 
 @functools.cache
@@ -192,28 +192,31 @@ _PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 }
 
 
-def _fits(value: Any, kind: Any) -> bool:
-    """Return whether a value may stand where an annotation is; an array is a list."""
+def _refusal(what: str, value: Any, kind: Any) -> str:
+    """Return why a value may not stand where an annotation is, "" if it may; an array is a list."""
     outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    wrong = f"{what}: {shown(value)} must be {_words(kind)}"
     if kind in _PLAIN:
-        return _PLAIN[kind][1](value)
+        return "" if _PLAIN[kind][1](value) else wrong
     if outer in (typing.Union, types.UnionType):
-        return any(_fits(value, each) for each in inner)
+        said = [_refusal(what, value, each) for each in inner if each is not type(None)]
+        fits = "" in said or (value is None and type(None) in inner)
+        return "" if fits else said[0] if len(said) == 1 else wrong
     if outer is collections.abc.Callable:
-        return callable(value)
+        return "" if callable(value) else wrong
     if outer is collections.abc.Mapping:
-        pairs = value.items() if isinstance(value, Mapping) else [(None, None)]
-        return all(_fits(each, of) for pair in pairs for each, of in zip(pair, inner))
+        if not isinstance(value, Mapping) or any(_refusal("", name, inner[0]) for name in value):
+            return wrong
+        return next(filter(None, (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items())), "")
     if outer in (collections.abc.Sequence, tuple, np.ndarray):
         array = isinstance(value, np.ndarray) and (value.ndim == 1 or outer is np.ndarray)
         listed = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
         fixed = outer is tuple and inner[-1] is not ...
         if not (array or listed) or (fixed and len(value) != len(inner)):
-            return False
-        return outer is np.ndarray or all(
-            _fits(each, of) for each, of in zip(value, inner if fixed else (inner[0],) * len(value))
-        )
-    return isinstance(value, outer or kind)
+            return wrong
+        kinds = () if outer is np.ndarray else inner if fixed else [inner[0]] * len(value)
+        return next(filter(None, (_refusal(what, each, of) for each, of in zip(value, kinds))), "")
+    return "" if isinstance(value, outer or kind) else wrong
 
 
 def _words(kind: Any) -> str:
@@ -230,7 +233,8 @@ def _words(kind: Any) -> str:
     if outer is np.ndarray:
         return "an array"
     if outer in (collections.abc.Sequence, tuple):
-        return f"a list of {f'{len(inner)} ' * (outer is tuple and inner[-1] is not ...)}{_several(inner[0])}"
+        count = f"{len(inner)} " * (outer is tuple and inner[-1] is not ...)
+        return "a list" if inner[0] is Any else f"a list of {count}{_several(inner[0])}"
     name = (outer or kind).__name__
     return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 

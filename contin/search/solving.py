@@ -76,8 +76,6 @@ def solve(
     """
     control = MeshControl() if mesh is None else mesh
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
-    if degree is not None:
-        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     _check_others(problem, others)
     forget_changed(problem)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
@@ -86,15 +84,20 @@ def solve(
         read = winding_names(problem.angles)  # off the guess, as of all others
         parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
     held = _check_count(problem, free)
-    options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
+    options = Options(parameters, free, intervals, _degree(problem, guess, control, degree))
     system, x = first_guess(problem, guess, options)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others, held)
 
 
-def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
-    """Return the degree where none is given."""
+def _degree(
+    problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl, given: int | None
+) -> int:  # fmt: skip
+    """Return the degree that is given; without one that of the guess, or the usual one."""
+    if given is not None:
+        checks.whole("degree", given, DEGREES[0], DEGREES[-1])
+        return given
     if isinstance(guess, Point) and guess.system.is_function_of_t:
         return guess.system.degree
     return problem.usual_degree(control.tolerance)
