@@ -87,7 +87,7 @@ def error(point: Solution, functional: Functional, apart: Apart = lambda a, b: n
     >>> growth = BoundaryValueProblem(lambda t, u, p: (u.u,), lambda a, b, p: (a.u - 1,), ["u"], {})
     >>> point = solve(growth, [1.0], intervals=2, degree=2)
     >>> found = error(point, lambda trial: trial.system.states(trial.x)[-1, 0])
-    >>> abs(point.system.states(point.x)[-1, 0] - math.e) < found < 1e-6
+    >>> print(abs(point.system.states(point.x)[-1, 0] - math.e) < found < 1e-6)
     True
     """
     here = np.asarray(functional(Trial.without_tangent(point.system, point.x)))
