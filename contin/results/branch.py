@@ -8,7 +8,6 @@ from typing import Any, overload
 
 import numpy as np
 
-from contin import checks
 from contin.arrays import Array
 from contin.core.state import Stop
 from contin.results import plot, table
@@ -75,7 +74,6 @@ class Branch:
         """
         return self.column(which) if isinstance(which, str) else self.points[which]
 
-    @checks.arguments
     def column(self, name: str) -> Array:
         """Return a parameter or functional over all points.
 
@@ -89,7 +87,6 @@ class Branch:
         """
         return np.array([point[name] for point in self.points])
 
-    @checks.arguments
     def labelled(self, label: str) -> list[Point]:
         """Return the points that carry a label, in order, as a run found them.
 
@@ -127,7 +124,6 @@ class Branch:
         """
         return table.to_pandas(self.points)
 
-    @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 

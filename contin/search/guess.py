@@ -25,8 +25,7 @@ from contin.search.lagrange import with_guessed_multipliers
 #: larger, the first mesh has a longer interval there; it is adapted in any case.
 _LEAST_INTERVAL = 1e-3
 
-#: A function of t, a point, numbers, (t, states), or one of these for each segment.
-Guess = Callable[[float], Any] | Point | float | Sequence[Any] | Array | None
+Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contin.lowlevel import Batch, least, minimum
+from contin.lowlevel import Batch, gradient, least, minimum
 
 
 def state(M, a):
@@ -63,3 +63,9 @@ def test_terms_of_a_potential_may_cancel():
     """(x - 3)**2/2 as a difference of terms of 1e8: its round-off, 1e-8, is that of the value at 1e-4 from the minimum."""
     found = minimum(lambda w: (1e8 + (w[0] - 3) ** 2 / 2 + (w[0] - 3) ** 4) - 1e8, [5.0])
     assert found[0] == pytest.approx(3.0, abs=1e-8)
+
+
+def test_a_least_value_may_read_an_argument_named_t():
+    """An argument's slot is not that of the time: H of U = (w - t)**2/2 is M**2/2 + M t."""
+    value, strain = gradient(lambda M, t: -least(lambda w: (w[0] - t) ** 2 / 2 - M * w[0], [0.0]), ["M"])(0.5, 1.0)
+    assert (value, strain) == (0.625, 1.5)
