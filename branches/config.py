@@ -98,9 +98,14 @@ class Config(Strict):
         """
         from ribbon_model.linear import circle, thresholds
 
-        law, material = LAWS[self.law], (self.nu, self.Gamma)
-        kappa_n = thresholds(law, self.m, self.n, *material)[0]
-        return {"kappa_n": kappa_n, "M2": 0.0, **circle(law, self.m, kappa_n, *material)}
+        law, parameters = LAWS[self.law], self.parameters
+        kappa_n = thresholds(law, self.m, self.n, parameters)[0]
+        return {"kappa_n": kappa_n, "M2": 0.0, **circle(law, self.m, kappa_n, parameters)}
+
+    @property
+    def parameters(self) -> dict[str, float | None]:
+        """The parameters of the law by name; None: not given."""
+        return {"nu": self.nu, "Gamma": self.Gamma}
 
     @property
     def material(self) -> str:

@@ -195,7 +195,9 @@ def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
-        index = covering(attributes["kappa_n"], attributes["kappa_star"], attributes["energy"])
+        law, Gamma = from_label(family["law"])
+        parameters = {"nu": family["nu"], "Gamma": Gamma}
+        index = covering(law, parameters, *(attributes[name] for name in ("kappa_n", "kappa_star", "energy")))
         return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
     branch = f"({family['m']},{family['n']})"
     if origin:
@@ -320,7 +322,7 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
 def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
     """Return kappa* and energy of a planar circle."""
     material, Gamma = from_label(law)
-    values = circle(material, m, kappa_n, nu, Gamma)
+    values = circle(material, m, kappa_n, {"nu": nu, "Gamma": Gamma})
     return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
 
 

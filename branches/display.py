@@ -152,7 +152,7 @@ class Display:
         label = f"{self._label:3d}" if point.label else "   "
         strip = config.strip()
         force, energy = (
-            without_round_off(found, strip.material.stiffness) * config.factor(name)
+            without_round_off(found, strip.section.stiffness) * config.factor(name)
             for name, found in (("F_tangent", strip.reactions(point)["F_tangent"]), ("energy", point["energy"]))
         )
         value = without_round_off(point[stage.follow] * config.factor(stage.follow), self._largest)
@@ -282,9 +282,11 @@ def _describe(config, event) -> str:
     if name == "start":
         return f"leaves the {config.m}-covered circle at {place}{certain}"
     if name == "trivial branch":
+        from ribbon_model.laws import LAWS
         from ribbon_model.linear import covering
 
-        index = covering(event["kappa_n"], event["kappa_star"], event["energy"])
+        columns = (float(event[name]) for name in ("kappa_n", "kappa_star", "energy"))
+        index = covering(LAWS[config.law], config.parameters, *columns)
         inside_out = ", curled against its natural curvature" if index < 0 else ""
         return f"ends on the {abs(index)}-covered circle{inside_out} at {place}{certain}"
     what = f" ({name})" if name and label != b"LP" else ""

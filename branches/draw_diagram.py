@@ -205,16 +205,17 @@ def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> No
     from ribbon_model.linear import circle, stability_interval
 
     material, Gamma = from_label(law)
+    parameters = {"nu": nu, "Gamma": Gamma}
 
     def plot(m, ends, **style):
-        height = [m if level else circle(material, m, kappa_n, nu, Gamma)["kappa_star"] for kappa_n in ends]
+        height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in ends]
         axes.plot(ends, height, zorder=1, **style)
 
     for m in _coverings(graph, law, nu):
         plot(m, window, color=UNSTABLE, lw=0.9, ls=LINES[False][0])
         if m < 1:  # curled against its natural curvature: the published intervals do not speak of these
             continue
-        low, high = stability_interval(material, m, nu, Gamma)
+        low, high = stability_interval(material, m, parameters)
         ends = [max(window[0], m * low), min(window[1], m * high)]
         plot(m, ends, color=STABLE, lw=2.6, solid_capstyle="butt")
 

@@ -33,7 +33,7 @@ def checked(point: Point, run: Continuation, config: Config) -> Point:
         run.stop = _explained(run, config)
     if point.name != "trivial branch" or config.origin is not None:
         return point
-    index = covering(point["kappa_n"], point["kappa_star"], point["energy"])
+    index = covering(LAWS[config.law], config.parameters, point["kappa_n"], point["kappa_star"], point["energy"])
     if is_threshold(config, index, point["kappa_n"], point.errors.get("kappa_n", math.nan)):
         return point
     run.stop = Stop(
@@ -51,7 +51,7 @@ def is_threshold(config: Config, index: int, kappa_n: float, error: float) -> bo
     ``index`` is the covering index of the circle, negative if it is curled against its natural curvature.
     """
     try:
-        known = thresholds(LAWS[config.law], index, config.n, config.nu, config.Gamma)
+        known = thresholds(LAWS[config.law], index, config.n, config.parameters)
     except (ValueError, ZeroDivisionError):
         return False
     allowed = max(_SAME * (1 + abs(kappa_n)), 0.0 if math.isnan(error) else _ESTIMATES * error)

@@ -88,9 +88,9 @@ class OpenBranch(StoredBranch):
 
     def _shape(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
         """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
-        material, numbers = self._strip(point).material, SimpleNamespace(**self._numbers(point))
+        material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
         strains = self._strains(point, t, states)
-        shape = shape_of(t, states, strains if material.ruled else np.zeros((len(t), 3)))
+        shape = shape_of(t, states, strains if material.form.has_rulings else np.zeros((len(t), 3)))
         along = {
             field: np.array([float(material.datum(name)(s, numbers)) for s in t])
             for field, name in (("breadth", "width"), ("depth", "thickness")) if name in material.along

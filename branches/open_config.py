@@ -1,7 +1,7 @@
 """Scenes of open strips: material, ends, loads, and stages that are followed one after the other; checked field by field.
 
 A scene with ``stages`` is one. With ``dimensions`` (SI units) its numbers are in m, rad, N, N m and N/m; without, in units of
-the length of the strip and its bending modulus (`ribbon_model.material`).
+the length of the strip and its bending modulus (`ribbon_model.section`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from branches.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
-from ribbon_model.material import Material
 from ribbon_model.plate import RIGIDITIES
+from ribbon_model.section import Section, section_of
 
 #: Ends in one word or two.
 _WORDS: dict[str, dict] = {
@@ -301,7 +301,7 @@ class OpenConfig(Strict):
         """Return the unit of a number, '' without dimensions."""
         return _unit_of(name)[2] if self.dimensions is not None else ""
 
-    def _material(self) -> Material:
+    def _material(self) -> Section:
         values = dict(self.material)
         law = values.pop("law", None)
         if self.dimensions is not None:
@@ -324,7 +324,7 @@ class OpenConfig(Strict):
             if not name.isidentifier():
                 raise ValueError(f"material: {name!r} is not usable as a name")
             numbers[name] = math.inf if isinstance(value, str) else value / self.factor(name)
-        return Material(str(law), numbers, self.along)
+        return section_of(str(law), numbers, self.along)
 
     @functools.cached_property
     def _strips(self):
@@ -380,7 +380,7 @@ class OpenConfig(Strict):
     @property
     def name(self) -> str:
         """The strip in words."""
-        law = self.strip().material.law
+        law = self.strip().section.law.name
         if self.closed is not None:
             twists = self.closed.half_twists
             return f"{law}, closed with {twists} half twist{'s' * (abs(twists) != 1)}"

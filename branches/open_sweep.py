@@ -119,7 +119,7 @@ def _told(config: OpenSweep, folder: Path, name: str, problem: str) -> list[str]
 
 def _load_kernels(configs: list[OpenConfig]) -> None:
     """Load the compiled functions (or compile them), once for each law before processes are forked."""
-    for config in {config.strip().material.law: config for config in configs}.values():
+    for config in {config.strip().section.law.name: config for config in configs}.values():
         try:
             first_state(config)
         except ConfigError:  # its own run says so

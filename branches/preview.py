@@ -43,9 +43,7 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
         if diagram.holds_circle(graph, one.material, one.nu, one.m, one.n):
             continue  # a duplicate, from its other end
         try:
-            points = exact.curve(
-                one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law, Gamma=one.Gamma
-            )
+            points = exact.curve(one.m, one.n, one.parameters, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
         except (ValueError, RuntimeError) as error:
             failed[f"{one.material}, nu = {exact_text(one.nu)}, ({one.m}, {one.n})"] = str(error)
             continue

@@ -52,7 +52,7 @@ def seed(config: Config):
     )
     try:
         system, x, tangent = _SEEDS[config.domain](
-            LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree, Gamma=config.Gamma
+            LAWS[config.law], config.m, config.n, config.parameters, config.mesh.intervals, config.mesh.degree
         )
     except TwoBendings as error:
         raise ConfigError(f"n: {error}") from error

@@ -31,7 +31,7 @@ def deviations(strip: Strip) -> dict[str, float]:
         worst = 0.0
         for m, n in ((1, 2), (3, 2), (3, 4), (5, 4), (5, 6)):
             try:
-                own = thresholds(FINITE_WIDTH, m, n, strip.poisson_ratio, strip.Gamma)[0]
+                own = thresholds(FINITE_WIDTH, m, n, strip.parameters)[0]
                 worst = max(worst, abs(thresholds(law, m, n, strip.poisson_ratio)[0] - own) / (abs(own) + m))
             except ValueError:  # a bifurcation that one of them does not have
                 worst = math.inf
@@ -113,7 +113,7 @@ def _circle_line(strip: Strip, ring: State, yield_strain) -> str:
 
 def _natural_radii(strip: Strip, m: int) -> str:
     """Return the natural radii for which the m-fold circle is stable."""
-    low, high = (m * end for end in energy_interval(FINITE_WIDTH, m, strip.poisson_ratio, strip.Gamma))
+    low, high = (m * end for end in energy_interval(FINITE_WIDTH, m, strip.parameters))
     least = "0" if high == math.inf else f"{1e3 * strip.radius(high):.4g}"
     if low > 0:
         return f"{least} ... {1e3 * strip.radius(low):.4g}"

@@ -72,8 +72,8 @@ def circles(strip: Strip) -> list[State]:
     """Return the planar circles."""
     found = []
     for m in coverings(strip):
-        values = linear.circle(FINITE_WIDTH, m, strip.kappa_n, strip.poisson_ratio, strip.Gamma)
-        negative = linear.index(FINITE_WIDTH, m, strip.kappa_n, strip.poisson_ratio, strip.Gamma)
+        values = linear.circle(FINITE_WIDTH, m, strip.kappa_n, strip.parameters)
+        negative = linear.index(FINITE_WIDTH, m, strip.kappa_n, strip.parameters)
         moment, strain = abs(values["M1"]) * strip.moment_unit, float(strip.strain(m - strip.kappa_n))
         found.append(State(circle_name(m), m, negative, moment, _energy(strip, values["energy"]), strain))
     return found
@@ -125,11 +125,11 @@ def at_natural_curvatures(
         See `ribbon_model.seeds.primary_branch`.
     """
     try:
-        start = linear.thresholds(FINITE_WIDTH, m, n, nu, Gamma)[0]
+        start = linear.thresholds(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma})[0]
     except NoThreshold:
         return
     limits = {"kappa_n": (min(start, *kappas) - _REACH, max(start, *kappas) + _REACH)}
-    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
+    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 8, 7)
     ends = convexity.test_functions(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
     for point in trace(point_of(system, x), settings, tangent=tangent):
@@ -176,7 +176,7 @@ def by_hand(strip: Strip, states: Sequence[State], ways: Mapping[str, Barrier], 
     with Progress("foldings", len(rings), quiet) as progress:
         for ring in rings:
             progress.part(ring.name)
-            path = folding(FINITE_WIDTH, ring.m, strip.kappa_n, strip.poisson_ratio, strip.Gamma)
+            path = folding(FINITE_WIDTH, ring.m, strip.kappa_n, strip.parameters)
             end = math.nan if path is None else _energy(strip, path.energies[-1])
             if path is not None and abs(end - energies[ways[ring.name].saddle]) < _SAME_SADDLE * strip.energy_unit:
                 found[ring.name] = path

@@ -33,7 +33,7 @@ def barriers_at(m: int, kappas: Sequence[float], nu: float, Gamma: float) -> np.
     It is that of the lowest state of index 1 on the primary branches (m, m - 1) and (m, m + 1), which lead to the circles of
     m - 2 and m + 2 turns; nan where there is none, too.
     """
-    lowest = np.full(len(kappas), np.nan)
+    lowest, parameters = np.full(len(kappas), np.nan), {"nu": nu, "Gamma": Gamma}
     for n in (m - 1, m + 1):
         if n < 1:
             continue
@@ -42,8 +42,8 @@ def barriers_at(m: int, kappas: Sequence[float], nu: float, Gamma: float) -> np.
             if stability.index(equilibrium).index == 1:
                 lowest[at] = np.fmin(lowest[at], point["energy"])
     for at, kappa_n in enumerate(kappas):
-        stable = linear.index(FINITE_WIDTH, m, kappa_n, nu, Gamma) == 0
-        lowest[at] -= linear.circle(FINITE_WIDTH, m, kappa_n, nu, Gamma)["energy"] if stable else math.nan
+        stable = linear.index(FINITE_WIDTH, m, kappa_n, parameters) == 0
+        lowest[at] -= linear.circle(FINITE_WIDTH, m, kappa_n, parameters)["energy"] if stable else math.nan
     return lowest
 
 
@@ -118,7 +118,7 @@ def chart(strip: Strip, m: int, out: Path, quiet: bool = True) -> None:
     with Progress("widths", len(_GAMMAS), quiet) as progress:
         for Gamma in _GAMMAS:
             progress.part(f"Gamma = {Gamma:.3g}")
-            low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, strip.poisson_ratio, float(Gamma)), *_LONGEST)
+            low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, strip.parameters | {"Gamma": float(Gamma)}), *_LONGEST)
             kappas.append(m * (low + (high - low) * _PARTS))
             table.append(barriers_at(m, kappas[-1], strip.poisson_ratio, float(Gamma)))
             progress.part_done()

@@ -15,7 +15,7 @@ from contin import Event
 from contin.lowlevel import Batch
 from ribbon_model.domains import StripProblem
 from ribbon_model.equilibrium import moment_with_force, moment_without_force
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 
 #: Parts of a line between strains at neighbouring nodes. U is concave on a tenth of a jump at least (measured on (3, 1)).
 _PARTS = 16
@@ -36,11 +36,9 @@ def _least(system, x):
     names = tuple(problem.parameters)
     w = _strains(problem).values(system.nodes, np.ascontiguousarray(u), u[:0], p)
     w = np.concatenate([w[:-1] + part * np.diff(w, axis=0) for part in np.arange(_PARTS) / _PARTS] + [w[-1:]])
-    law, known = problem.law, dict(zip(names, p))
-    stiffness = law.strain_energy(w, known["kappa_n"], *(known[name] for name in law.parameters))[2]
-    U11, U13, U33 = stiffness[:, 0, 0], stiffness[:, 0, 2], stiffness[:, 2, 2]
-    ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
-    return float(np.nan_to_num(ratio, nan=-1.0).min())
+    known = dict(zip(names, p))
+    values = [known[name] for name in ("kappa_n", *problem.law.parameters)]
+    return float(problem.law.margin(np.empty((len(w), 0)), w, *values).min())
 
 
 @functools.cache

@@ -281,13 +281,13 @@ def identify(strip: Strip) -> Rest:
     ValueError
         The energy is not convex in the strains at that equilibrium, so there is no index.
     """
-    law, nu, kappa_n, strains, Gamma = strip.law, strip.nu, strip.kappa_n, strip.strains, strip.Gamma
+    law, parameters, kappa_n, strains = strip.law, strip.parameters, strip.kappa_n, strip.strains
     if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < _PLANAR:
         m = round(strains[:, 0].mean())
         # a strip that is turned inside out is, seen from the other side, one with the opposite natural curvature
         sense = math.copysign(1, m)
-        stability = index(second_variation.circle(law, nu, abs(m), sense * kappa_n, Gamma))
-        values = law.circle(abs(m), sense * kappa_n, nu, Gamma)
+        stability = index(second_variation.circle(law, parameters, abs(m), sense * kappa_n))
+        values = law.circle(abs(m), sense * kappa_n, parameters)
         return Rest("circle", m, 0, values["energy"], sense * values["kappa_star"], 0.0, 0.0, stability)
     solutions = [polished(strip, intervals) for intervals in (24, 48)]
     values = np.array([system.functionals(x) for system, x in solutions])[:, ::-1]  # energy, kappa*
@@ -320,7 +320,7 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
     strip = replace(strip, strains=np.roll(strip.strains, -start, axis=0))
     loads = -strip.segment * strip.linearized()[3]
     values = dict(zip(("M1", "M2", "M3", "R1", "R2", "R3"), loads)) | {"kappa_n": strip.kappa_n, "unfold": 0.0}
-    values |= strip.law.values(strip.nu, strip.Gamma)
+    values |= strip.law.values(strip.parameters)
     system = LOOP.discretize(strip.law, intervals, degree, values)
     axes, x = strip.along(LENGTH * system.nodes)
     guess = system.pack(np.hstack([quaternions(axes.transpose(0, 2, 1)), x]), values)
@@ -331,15 +331,15 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
 
 def _on_primary_branches(strip: Strip, n: int):
     """Yield (m, point) for every point on a primary branch of wavenumber n with the strip's kappa_n, by quadrature."""
-    law, nu, kappa_n, Gamma = strip.law, strip.nu, strip.kappa_n, strip.Gamma
+    law, parameters, kappa_n = strip.law, strip.parameters, strip.kappa_n
     for m in (m for m in _COVERINGS if n and m != n and m % (2 * n)):
         try:
-            first = thresholds(law, m, n, nu, Gamma)[0]
+            first = thresholds(law, m, n, parameters)[0]
             limits = min(first, kappa_n) - 1, max(first, kappa_n) + 1
-            points = exact.curve(m, n, nu, limits, law=law.name, Gamma=Gamma)
+            points = exact.curve(m, n, parameters, limits, law=law)
         except (ValueError, RuntimeError):  # no such branch, or none with a regular start on its circle
             continue
         for one, other in itertools.pairwise(points):
             if (one.kappa_n - kappa_n) * (other.kappa_n - kappa_n) <= 0:
                 near = min((one, other), key=lambda point: abs(point.kappa_n - kappa_n))
-                yield m, exact.solve(m, n, nu, near, kappa_n=kappa_n, law=law.name)
+                yield m, exact.solve(m, n, parameters, near, kappa_n=kappa_n, law=law)

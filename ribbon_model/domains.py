@@ -22,7 +22,7 @@ import numpy as np
 from contin import BoundaryValueProblem
 from contin.lowlevel import Collocation
 from ribbon_model.equilibrium import LENGTH, directors, with_force, without_force
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 from ribbon_model.shape import Shape
 
 #: With a smaller |sin| of half the angle between two waves, these are not rotated against each other, and there is no centre.

@@ -13,7 +13,7 @@ import functools
 from contin import VariationalProblem
 from ribbon_model.domains import Domain
 from ribbon_model.equilibrium import CENTRELINE, FRAME, LENGTH, directors, spin
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 
 
 @functools.cache

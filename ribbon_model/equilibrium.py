@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 
 LENGTH = 2 * math.pi
 FRAME = ("q0", "q1", "q2", "q3")

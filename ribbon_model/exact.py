@@ -30,8 +30,9 @@ from typing import ClassVar
 import numpy as np
 
 from ribbon_model import exact_finite_width
-from ribbon_model.exact_finite_width import FiniteWidthPoint
-from ribbon_model.exact_rods import FLOAT, RODS, Numerics, RodPoint
+from ribbon_model.exact_rods import FLOAT, RODS, Numerics
+from ribbon_model.laws import LAWS
+from ribbon_model.older import takes_parameters
 
 _HOMOCLINIC = -300.0  # log(q)/2 at which the follower stops, before q underflows
 _SHORTEST_STEP = 1e-7
@@ -98,7 +99,8 @@ def residuals(c, A, kappa_n, m, n, nu):
     return np.pi * np.array([(mean + mean_squared) / c - 1 / (2 * n), _defect(azimuth, m, n)])
 
 
-def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0):
+@takes_parameters
+def solve(m, n, parameters, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0):
     """Return the point of the branch with given kappa_n, or given amplitude, nearest a guess in the sense of Newton's method.
 
     Parameters
@@ -124,13 +126,12 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
     """
     if (kappa_n is None) == (amplitude is None):
         raise ValueError("give exactly one of kappa_n and amplitude")
-    if isinstance(guess, FiniteWidthPoint):
+    if _law(law) not in _FAMILIES:
         return exact_finite_width.solve(guess, kappa_n=kappa_n, amplitude=amplitude)
-    family = _family(law, m, n, nu, root)
-    if isinstance(guess, ExactPoint | RodPoint):
-        z = family.coordinates(guess)
-    else:
-        z = np.array([np.log1p(guess[1]), np.log(_q(*guess, nu)) / 2])
+    family = _family(law, m, n, parameters, root)
+    z = getattr(guess, "coordinates", None)
+    if z is None:
+        z = np.array([np.log1p(guess[1]), np.log(_q(*guess, family.nu)) / 2])
     for _ in range(30):
         defect, numerator, denominator = FLOAT.gradients(family.parts, z)
         if kappa_n is None:
@@ -145,21 +146,22 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
     raise RuntimeError(f"no convergence on branch ({m}, {n}): start nearer, or prescribe the other quantity")
 
 
-def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0, Gamma=None):
+@takes_parameters
+def curve(m, n, parameters=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0):
     """Return the branch from the m-covered circle to the one where it ends, or to a limit of kappa_n.
 
     Parameters
     ----------
+    parameters : float, or mapping of str to float
+        Those of the law by name; a number is nu.
     kappa_limits : (float, float)
         The curve stops where kappa_n leaves this interval.
     step : float
         Largest arclength between points in the plane of the unknowns: (log(1 + A), log(q)/2) of the ribbon.
-    law : str
-        'ribbon', 'flat rod', 'isotropic rod', or 'finite width': see `ribbon_model.exact_finite_width`.
+    law : str or Law
+        Of the paper, by name; for 'finite width', and for any other law, see `ribbon_model.exact_finite_width`.
     root : int
         Number of the threshold on the m-covered circle: 0, or for the isotropic rod also 1.
-    Gamma : float, optional
-        For the law 'finite width'.
 
     Returns
     -------
@@ -179,9 +181,9 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     >>> [point.label for point in branch if point.label]
     ['BP', 'LP', 'BP']
     """
-    if law in _FOLLOWERS:
-        return _FOLLOWERS[law](m, n, nu, Gamma, kappa_limits, step)
-    family, (lowest, highest) = _family(law, m, n, nu, root), kappa_limits
+    if _law(law) not in _FAMILIES:
+        return exact_finite_width.curve(m, n, parameters, kappa_limits, step, _law(law))
+    family, (lowest, highest) = _family(law, m, n, parameters, root), kappa_limits
     start, begin = family.threshold(m), family.circle(m)
     if not lowest <= start <= highest:
         raise ValueError(f"branch ({m}, {n}) starts at kappa_n = {start:.6g}, outside {tuple(kappa_limits)}")
@@ -212,7 +214,8 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     return points
 
 
-def initial_slope(m, n, nu, law="ribbon", root=0):
+@takes_parameters
+def initial_slope(m, n, parameters, law="ribbon", root=0):
     """Return d kappa_n / dA at the start of the branch, with the squared amplitude A: its sign is the pitchfork's sense.
 
     It is zero if a fold is born from the pitchfork. Raises as `curve` does.
@@ -222,13 +225,14 @@ def initial_slope(m, n, nu, law="ribbon", root=0):
     >>> initial_slope(1, 2, 0.3) > 0  # kappa_n grows: the pitchfork is supercritical
     True
     """
-    family = _family(law, m, n, nu, root)
+    family = _family(law, m, n, parameters, root)
     defect, numerator, denominator = FLOAT.gradients(family.parts, family.circle(m))
     gradient = (numerator[1] * denominator[0] - numerator[0] * denominator[1]) / denominator[0] ** 2
     return float(gradient[0] - gradient[1] * defect[1][0] / defect[1][1])  # along the branch, log(1 + A) being A to first order
 
 
-def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamma=None):
+@takes_parameters
+def folds(m, n, parameters=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0):
     """Return the points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does.
 
     Examples
@@ -236,10 +240,11 @@ def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamm
     >>> [round(point.kappa_n, 6) for point in folds(1, 2, 0.3)]
     [4.075668]
     """
-    return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root, Gamma=Gamma) if point.label == "LP"]
+    return [point for point in curve(m, n, parameters, kappa_limits, law=law, root=root) if point.label == "LP"]
 
 
-def end(m, n, nu, law="ribbon", root=0):
+@takes_parameters
+def end(m, n, parameters, law="ribbon", root=0):
     """Return (covering index, kappa_n) of the circle where the branch ends, or None. Raises as `curve`.
 
     None if the branch never returns to a circle (2n < m, except for the isotropic rod), or has infinite kappa_n somewhere on
@@ -250,7 +255,7 @@ def end(m, n, nu, law="ribbon", root=0):
     >>> end(1, 2, 0.3)
     (3, -0.5)
     """
-    family = _family(law, m, n, nu, root)
+    family = _family(law, m, n, parameters, root)
     if family.finish is None:
         return None
     signs = set()
@@ -318,11 +323,21 @@ def refine(point, digits):
     raise RuntimeError(f"no convergence to {digits} digits on branch ({point.m}, {point.n})")
 
 
-def _family(law, m, n, nu, root):
+def _law(law):
+    """Return a law that is given by its name, or as it is."""
+    found = LAWS.get(law, law)
+    if type(found) is str:
+        raise ValueError(f"law = {law!r} is none of {', '.join(map(repr, LAWS))}")
+    return found
+
+
+def _family(law, m, n, parameters, root):
+    law = _law(law)
     if law not in _FAMILIES:
-        raise ValueError(f"law = {law!r} is none of {', '.join(map(repr, _FAMILIES))}")
+        raise ValueError(f"law = {law.name!r} is none of {', '.join(repr(known.name) for known in _FAMILIES)}")
     if root not in range(_FAMILIES[law].roots):
-        raise ValueError(f"root = {root}: the {law} has no such threshold")
+        raise ValueError(f"root = {root}: the {law.name} has no such threshold")
+    (nu,) = law.named(parameters).values()
     _check(m, n, nu, root)
     return _FAMILIES[law](m, n, nu, root)
 
@@ -411,9 +426,8 @@ class _Ribbon:
         return point.coordinates
 
 
-#: The branches of a law, by its name: those for the follower below, and those with a follower of their own.
-_FAMILIES = {ExactPoint.law: _Ribbon, **RODS}
-_FOLLOWERS = {exact_finite_width.LAW: exact_finite_width.curve}
+#: The branches that the follower below follows, by their laws.
+_FAMILIES = {LAWS[name]: family for name, family in {ExactPoint.law: _Ribbon, **RODS}.items()}
 
 
 def _homoclinic(z):

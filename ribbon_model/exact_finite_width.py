@@ -1,4 +1,4 @@
-"""The exact (quadrature) solution of the primary branches of the law 'finite width', independent of collocation.
+"""The exact (quadrature) solution of the primary branches of a law with omega_2 = 0, as of finite width, without collocation.
 
 With R = 0, |M| = mu and H = omega.grad U - U are constant along the strip: omega = rho (cos phi, sin phi) runs along a level
 curve of H, which meets every ray once where U is convex (dH/drho = omega.D2U.omega/rho). A quarter wave runs from the mirror,
@@ -13,22 +13,23 @@ The integrands are even and pi-periodic in theta: the midpoint rule converges ex
 at each node, M_2**2 from its own derivative, which does not cancel. Two equations for kappa_n,
 omega = rho(0) and sqrt(A): one curve.
 
-Units: B = 1 (the plate's modulus times the width), L = 2 pi. Source of every number: quadrature of the R = 0 equilibrium.
+U must be even in omega_3. Units: B = 1 (of the law 'finite width' the plate's modulus times the width), L = 2 pi. Source of
+every number: quadrature of the R = 0 equilibrium.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ribbon_model import linear
-from ribbon_model.finite_width import strain_energy
+from ribbon_model.law import Law
 from ribbon_model.laws import FINITE_WIDTH
+from ribbon_model.older import takes_parameters
 
-#: The law's name.
-LAW = FINITE_WIDTH.name
 _FEWEST, _MOST = 32, 512  # nodes of a quarter wave
 _DIFFERENCE = 1e-5
 _FIRST, _SHORTEST = 0.02, 1e-3  # steps; the first is sqrt(A) of the first point, and off the circle
@@ -43,10 +44,10 @@ class FiniteWidthPoint:
     elsewhere.
     """
 
+    law: Law
+    parameters: Mapping[str, float]
     m: int
     n: int
-    nu: float
-    Gamma: float
     kappa_n: float
     omega: float
     amplitude: float
@@ -60,18 +61,19 @@ class FiniteWidthPoint:
         return np.array([self.kappa_n / 5, self.omega, math.sqrt(self.amplitude)])
 
 
-def _derivatives(w, kappa_n, nu, Gamma):
-    """Return (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), shape (9, nodes), at strains (nodes, 2)."""
-    return np.array(strain_energy(w[:, 0], w[:, 1], kappa_n, nu, Gamma))
+def _derivatives(w, kappa_n, law, values):
+    """Return (U, U_1, U_3, U_11, U_13, U_33, U_k), shape (7, nodes), at strains (nodes, 2)."""
+    U, slope, curvature = law.derivatives(np.insert(w, 1, 0.0, axis=1), kappa_n, *values)
+    return np.array([U, slope[:, 0], slope[:, 2], curvature[:, 0, 0], curvature[:, 0, 2], curvature[:, 2, 2], slope[:, 3]])
 
 
-def _level(direction, omega, kappa_n, nu, Gamma):
+def _level(direction, omega, kappa_n, law, values):
     """Return strains (nodes, 2) on rays (nodes, 2), on the level curve of H through (omega, 0), and derivatives; or nan."""
-    U, U1 = _derivatives(np.array([[omega, 0.0]]), kappa_n, nu, Gamma)[:2, 0]
+    U, U1 = _derivatives(np.array([[omega, 0.0]]), kappa_n, law, values)[:2, 0]
     level, rho = omega * U1 - U, np.full(len(direction), float(omega))
     for _ in range(60):
         w = rho[:, None] * direction
-        d = _derivatives(w, kappa_n, nu, Gamma)
+        d = _derivatives(w, kappa_n, law, values)
         slope = w[:, 0] ** 2 * d[3] + 2 * w[:, 0] * w[:, 1] * d[4] + w[:, 1] ** 2 * d[5]  # rho dH/drho
         change = (level - (w[:, 0] * d[1] + w[:, 1] * d[2] - d[0])) / slope
         if np.abs(change).max() < 1e-13:
@@ -80,14 +82,14 @@ def _level(direction, omega, kappa_n, nu, Gamma):
     return w * np.nan, d * np.nan, slope * np.nan
 
 
-def quadratures(kappa_n, omega, root_A, nu, Gamma) -> np.ndarray:
+def quadratures(kappa_n, omega, root_A, law, values) -> np.ndarray:
     """Return length, precession of d_1, kappa* and U (both integrated over S) of a quarter wave, shape (4,).
 
     Not a number outside the convex domain. The number of nodes is doubled until the result stays the same.
     """
     nodes, before = _FEWEST, None
     while nodes <= _MOST:
-        now = _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes)
+        now = _quadratures(kappa_n, omega, root_A, law, values, nodes)
         if not np.isfinite(now).all():
             return now
         if before is not None and np.abs(now - before).max() < 1e-13 * (1 + np.abs(now).max()):
@@ -96,11 +98,11 @@ def quadratures(kappa_n, omega, root_A, nu, Gamma) -> np.ndarray:
     return before
 
 
-def _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes):
+def _quadratures(kappa_n, omega, root_A, law, values, nodes):
     theta = np.append((np.arange(nodes) + 0.5) * math.pi / (2 * nodes), math.pi / 2)
     tangent = root_A * np.sin(theta)  # of phi/2
     direction = np.array([1 - tangent**2, 2 * tangent]).T / (1 + tangent**2)[:, None]
-    w, d, slope = _level(direction, omega, kappa_n, nu, Gamma)
+    w, d, slope = _level(direction, omega, kappa_n, law, values)
     mu = math.hypot(d[1, -1], d[2, -1])
     w, d, slope, theta, tangent = w[:-1], d[:, :-1], slope[:-1], theta[:-1], tangent[:-1]
     _, M1, M3, U11, U13, U33 = d[:6]
@@ -110,7 +112,7 @@ def _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes):
     fall = 2 * (w[:, 1] * M1 - w[:, 0] * M3) * rate  # of M_2**2, by theta, up to the sign
     M2 = np.sqrt(np.abs(_integral_to_the_end(fall, theta)))
     precession = mu * w[:, 1] * M3 / (M2**2 + M3**2)
-    integrands = np.array([np.ones_like(M2), precession, kappa_n - d[6], d[0] - kappa_n**2 / 2])
+    integrands = np.array([np.ones_like(M2), precession, -d[6], d[0]])
     return integrands @ (rate / M2) * (math.pi / (2 * nodes))
 
 
@@ -124,11 +126,11 @@ def _integral_to_the_end(values, theta):
 class _Branch:
     """The curve of one branch in v = (kappa_n, omega, sqrt(A))."""
 
-    def __init__(self, m, n, nu, Gamma):
-        self.m, self.n, self.nu, self.Gamma = m, n, nu, Gamma
+    def __init__(self, law, parameters, m, n):
+        self.law, self.parameters, self.m, self.n = law, law.values(parameters), m, n
 
     def defects(self, v):
-        length, precession, _, _ = quadratures(*v, self.nu, self.Gamma)
+        length, precession, _, _ = quadratures(*v, self.law, tuple(self.parameters.values()))
         return np.array([length * 2 * self.n / math.pi - 1, precession * 2 / math.pi - abs(self.m - self.n) / self.n])
 
     def slopes(self, v):
@@ -158,16 +160,16 @@ class _Branch:
         return None
 
     def point(self, v, label=""):
-        length, _, star, energy = quadratures(*v, self.nu, self.Gamma)
+        length, _, star, energy = quadratures(*v, self.law, tuple(self.parameters.values()))
         values = (v[0], v[1], v[2] ** 2, star / length, energy / length)
-        return FiniteWidthPoint(self.m, self.n, self.nu, self.Gamma, *map(float, values), label)
+        return FiniteWidthPoint(self.law, self.parameters, self.m, self.n, *map(float, values), label)
 
     def circle(self, index):
         """Return the circle where the branch begins or ends."""
-        kappa_n = linear.thresholds(FINITE_WIDTH, index, self.n, self.nu, self.Gamma)[0]
-        values = linear.circle(FINITE_WIDTH, index, kappa_n, self.nu, self.Gamma)
+        kappa_n = linear.thresholds(self.law, index, self.n, self.parameters)[0]
+        values = linear.circle(self.law, index, kappa_n, self.parameters)
         place = (kappa_n, float(index), 0.0, float(values["kappa_star"]), float(values["energy"]))
-        return FiniteWidthPoint(self.m, self.n, self.nu, self.Gamma, *place, "BP")
+        return FiniteWidthPoint(self.law, self.parameters, self.m, self.n, *place, "BP")
 
     def first(self):
         """Return the first point after the circle, with the smallest sqrt(A)."""
@@ -175,24 +177,29 @@ class _Branch:
         return self.correct(np.array([begin.kappa_n, begin.omega, _FIRST]), np.array([0.0, 0.0, 1.0]))
 
 
-def curve(m, n, nu, Gamma, kappa_limits=(-100.0, 100.0), step=0.1) -> list[FiniteWidthPoint]:
+@takes_parameters
+def curve(m, n, parameters, kappa_limits=(-100.0, 100.0), step=0.1, law=FINITE_WIDTH) -> list[FiniteWidthPoint]:
     """Return the branch from the m-covered circle to the one where it ends, to a limit of kappa_n, or to where it is lost.
 
     Parameters
     ----------
+    parameters : mapping of str to float
+        Those of the law, by name.
     step : float
         Largest distance between points in (kappa_n / 5, omega, sqrt(A)).
 
     Raises
     ------
     ValueError
-        See `linear.thresholds`; or m is a multiple of 2n (the centreline does not close).
+        See `linear.thresholds`; a law that has an omega_2; or m is a multiple of 2n (the centreline does not close).
     RuntimeError
         No point beside the circle is found.
     """
     if m % (2 * n) == 0:
         raise ValueError(f"branch ({m}, {n}) does not close with R = 0, because m is a multiple of 2n")
-    branch = _Branch(m, n, nu, Gamma)
+    if not law.constrained:
+        raise ValueError(f"the law {law.name!r} has an omega_2: there is no such quadrature")
+    branch = _Branch(law, parameters, m, n)
     points, v = [branch.circle(m)], branch.first()
     if v is None:
         raise RuntimeError(f"branch ({m}, {n}) could not be left from its circle")
@@ -227,7 +234,7 @@ def solve(guess: FiniteWidthPoint, *, kappa_n: float | None = None, amplitude: f
     RuntimeError
         If Newton does not converge.
     """
-    branch = _Branch(guess.m, guess.n, guess.nu, guess.Gamma)
+    branch = _Branch(guess.law, guess.parameters, guess.m, guess.n)
     v = np.array([guess.kappa_n, guess.omega, math.sqrt(guess.amplitude)])
     if kappa_n is not None:
         v[0], normal = kappa_n, np.array([1.0, 0.0, 0.0])

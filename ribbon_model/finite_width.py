@@ -25,9 +25,7 @@ H is another minimum's or not a number. U and H are written once, as functions o
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 #: Below this x**4 the first pole of g and a series are used, of which `_TERMS` terms leave 1e-16 of g and 2e-14 of its fourth
@@ -89,11 +87,10 @@ def foundation(x):
     return 2 * (1 + e * e - 2 * e * math.cos(x)) / (x * (1 - e * e + 2 * e * math.sin(x)))
 
 
-# --- the energy
-# -----------------------------------------------------------------------------------------------------------------
+# --- the energy -------------------------------------------------------------------------------------------------------------
 
 
-class Section(NamedTuple):
+class Plate(NamedTuple):
     """The numbers on which U of a strip of a plate depends, over the modulus D22 of the plate across; see `ribbon_model.plate`.
 
     Attributes
@@ -110,19 +107,19 @@ class Section(NamedTuple):
     stiff: float
     C: float
 
-    def softened(self, part) -> Section:
+    def softened(self, part) -> Plate:
         """Return the section, over D22 times ``part``, of which the plate across has only this part of its stiffness."""
         plane = self.plane / part
-        return Section(self.nu, plane, self.twist / part, (plane + self.nu * self.nu) ** 0.5, self.C)
+        return Plate(self.nu, plane, self.twist / part, (plane + self.nu * self.nu) ** 0.5, self.C)
 
 
-def isotropic(nu, Gamma) -> Section:
+def isotropic(nu, Gamma) -> Plate:
     """Return the section of an isotropic strip."""
     plane = 1 - nu * nu
-    return Section(nu, plane, 1 - nu, 1.0, 3 * plane * Gamma * Gamma)
+    return Plate(nu, plane, 1 - nu, 1.0, 3 * plane * Gamma * Gamma)
 
 
-def section_energy(w1, w3, kappa_n, section: Section):
+def section_energy(w1, w3, kappa_n, section: Plate):
     """Return U of a section, without the term -kappa_n**2/2."""
     nu, plane, twist, _, C = section
     bent = w1 - kappa_n
@@ -130,7 +127,7 @@ def section_energy(w1, w3, kappa_n, section: Section):
     return plane * bent * bent / 2 + twist * w3 * w3 + C * membrane(C * w1 * w1) * Q * Q / 2
 
 
-def ribbon_energy(w1, w3, kappa_n, section: Section):
+def ribbon_energy(w1, w3, kappa_n, section: Plate):
     """Return U of an inextensible ribbon, g = 1/z, without the term -kappa_n**2/2."""
     nu, plane, twist, _, _ = section
     bent = w1 - kappa_n
@@ -138,116 +135,12 @@ def ribbon_energy(w1, w3, kappa_n, section: Section):
     return plane * bent * bent / 2 + twist * w3 * w3 + curved * curved / 2
 
 
-def energy(w1, w3, kappa_n, nu, Gamma):
-    """Return U of an isotropic strip, without the term -kappa_n**2/2."""
-    return section_energy(w1, w3, kappa_n, isotropic(nu, Gamma))
+def isotropic_energy(w1, w2, w3, kappa_n, nu, Gamma):
+    """Return U of an isotropic strip."""
+    return section_energy(w1, w3, kappa_n, isotropic(nu, Gamma)) - kappa_n * kappa_n / 2
 
 
-@functools.cache
-def _derivatives(function: Callable[..., float]):
-    """Return U and its slopes, to be evaluated for many sections, and the columns of their derivatives."""
-    from contin.lowlevel import Batch, gradient  # loads compiled code, which circles do not need
-
-    def value(w1, w3, kappa_n, nu, plane, twist, stiff, C):
-        return function(w1, w3, kappa_n, Section(nu, plane, twist, stiff, C))
-
-    slopes = gradient(value, ("w1", "w3", "kappa_n"))
-    batch = Batch([lambda w, p: slopes(*w)], [4], ("w1", "w3", "kappa_n", *Section._fields), (), times=False)
-    return batch, batch.columns([], [0, 1, 2])
-
-
-def section_derivatives(w1, w3, kappa_n, section: Section, function: Callable[..., float] = section_energy) -> tuple:
-    """Return U of sections and its derivatives, k for kappa_n: (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k).
-
-    Numbers or arrays, which are broadcast; ``function`` is `section_energy` or `ribbon_energy`.
-    """
-    import numpy as np
-
-    batch, columns = _derivatives(function)
-    given = np.broadcast_arrays(w1, w3, kappa_n, *section)
-    points = np.array([values.ravel() for values in given], dtype=float).T.copy()
-    value, slope = batch.jacobian(np.zeros(len(points)), points, points[:0], np.empty(0), columns)
-    found = np.array([*value[:, :3].T, slope[:, 1, 0], slope[:, 1, 1], slope[:, 2, 1], value[:, 3], *slope[:, 1:3, 2].T])
-    return tuple(found.reshape(9, *given[0].shape)) if given[0].shape else tuple(found[:, 0].tolist())
-
-
-def strain_energy(w1, w3, kappa_n, nu, Gamma) -> tuple:
-    """Return `section_derivatives` of an isotropic strip."""
-    return section_derivatives(w1, w3, kappa_n, isotropic(nu, Gamma))
-
-
-# --- circles and arcs
-# -----------------------------------------------------------------------------------------------------------
-
-
-def on_circle(ratio, nu, width) -> tuple:
-    """Moment M, torsional modulus t and tangent bending modulus of a planar circle, lengths in units of its radius r0.
-
-    ``ratio`` is kappa_n r0, ``width`` is w**2/(h r0); floats or arrays. With y = 1 - ratio and G' = dG/dlog x,
-
-        M = (1 - nu**2 G) y - nu**2 G' y**2 / 4,    t = 2 (1 - nu) + 2 nu (1 - G) y.
-
-    The term with G in t is the membrane stress of the anticlastic profile, Wagner's effect.
-    """
-    y = 1 - ratio
-    G, first, second = _foundation(3 * (1 - nu * nu) * width * width)
-    moment = (1 - nu * nu * G) * y - nu * nu * first * y * y / 4
-    bending = 1 - nu * nu * G - nu * nu * first * y - nu * nu * y * y * (second / 8 - first / 4)
-    return moment, 2 * (1 - nu) + 2 * nu * (1 - G) * y, bending
-
-
-def convex_limits(nu, width) -> list[float]:
-    """Return the kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order.
-
-    Examples
-    --------
-    >>> convex_limits(0.3, 0.0)  # without width it is the flat rod, which is convex
-    []
-    """
-    t0, slope = on_circle(1.0, nu, width)[1], on_circle(0.0, nu, width)[1] - on_circle(1.0, nu, width)[1]
-    zeros = [-float(t0 / slope)] if slope else []
-    b0, b1, b2 = (on_circle(1 - y, nu, width)[2] for y in (0.0, 1.0, -1.0))
-    A, B = (b1 + b2) / 2 - b0, (b1 - b2) / 2
-    radicand = B * B - 4 * A * b0
-    if A and radicand >= 0:
-        zeros += [float(2 * b0 / (-B - math.sqrt(radicand))), float(2 * b0 / (-B + math.sqrt(radicand)))]
-    return [1 - y for y in zeros]
-
-
-@functools.cache
-def _membrane_slopes():
-    """Return the functions (g, g') and (g', g'')."""
-    from contin.lowlevel import gradient
-
-    first = gradient(membrane, ("z",))
-    return first, gradient(lambda z: first(z)[1], ("z",))
-
-
-def _foundation(z):
-    """Return G and its first two derivatives by log x at x**4 = z >= 0, numbers or arrays."""
-    import numpy as np
-
-    first, second = _membrane_slopes()
-    g, _ = np.vectorize(first, otypes=[float] * 2)(z)
-    slope, curvature = np.vectorize(second, otypes=[float] * 2)(z)
-    return 1 - z * g, -4 * z * (g + z * slope), -16 * z * (g + 3 * z * slope + z * z * curvature)
-
-
-def first_zero_of_t(nu: float, width: float) -> float | None:
-    """Return the smallest xi in (0, 1) where the modulus t of the unfolding arc vanishes, or None; width is w**2/(R h)."""
-    import numpy as np
-    from scipy.optimize import brentq
-
-    def t(xi):
-        return strain_energy(1 - xi, 0.0, 1.0, nu, width)[5]
-
-    grid = 1 - np.geomspace(1.0, 1e-3 / (1 + width), 2000)
-    below = np.flatnonzero(t(grid) < 0)
-    return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
-
-
-# --- the Legendre transform
-# -----------------------------------------------------------------------------------------------------
+# --- the Legendre transform -------------------------------------------------------------------------------------------------
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
@@ -256,7 +149,7 @@ def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
     return complementary(M1, M3, kappa_n, section, section.C < _NARROW) + kappa_n * kappa_n / 2
 
 
-def complementary(M1, M3, kappa_n, section: Section, narrow=False):
+def complementary(M1, M3, kappa_n, section: Plate, narrow=False):
     """Return the largest M.omega - U of a section near `start`; nan where U is not convex.
 
     Where U - M.omega has two minima, a strip stays at the one from which it came. What is bent in the plane, from a circle or
@@ -280,7 +173,7 @@ def complementary(M1, M3, kappa_n, section: Section, narrow=False):
     return -least(excess, (w1, w3))
 
 
-def ribbon_complementary(M1, M3, kappa_n, section: Section):
+def ribbon_complementary(M1, M3, kappa_n, section: Plate):
     """Return the same of a ribbon, with omega_1 > 0 where there is such a minimum."""
     import numpy as np
 
@@ -298,7 +191,7 @@ def ribbon_complementary(M1, M3, kappa_n, section: Section):
     return -least(excess, (np.where(known, w1, flat1), np.where(known, w3, flat3)))
 
 
-def ribbon_strains(M1, M3, kappa_n, section: Section):
+def ribbon_strains(M1, M3, kappa_n, section: Plate):
     """Return omega_1 > 0 and omega_3 of a ribbon, by a closed form, and 1, or 0 where it has none.
 
     It is exact where D12 + 2 D66 = sqrt(D11 D22), as for isotropic plates: scaled by stiff, U then has their form.
@@ -314,7 +207,7 @@ def ribbon_strains(M1, M3, kappa_n, section: Section):
     return w1 / stiff, eta * w1 / np.sqrt(stiff), (a > _LEAST * root) & (c > 0)
 
 
-def start(M1, M3, kappa_n, section: Section, narrow=False):
+def start(M1, M3, kappa_n, section: Plate, narrow=False):
     """Return the strains at which the search for the minimum of U - M.omega starts, and whether they are the ribbon's.
 
     They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as
@@ -339,7 +232,7 @@ def start(M1, M3, kappa_n, section: Section, narrow=False):
     return np.where(known, w1, flat1), np.where(known, w3, flat3), known
 
 
-def flat_rod_strains(M1, M3, kappa_n, section: Section):
+def flat_rod_strains(M1, M3, kappa_n, section: Plate):
     """Return omega_1 and omega_3 of a flat rod."""
     return kappa_n + M1 / section.plane, M3 / (2 * section.twist)
 

@@ -11,6 +11,7 @@ to that state is the barrier.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,8 @@ from contin import Settings, trace
 from contin.lowlevel import Collocation, point_of
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
+from ribbon_model.older import takes_parameters
 from ribbon_model.shown import Shown
 
 #: The free parameters with couples, at fixed kappa_n.
@@ -50,7 +52,8 @@ class Folding(Shown):
         return int(np.argmax(self.couples))
 
 
-def folding(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> Folding | None:
+@takes_parameters
+def folding(law: Law, m: int, kappa_n: float, parameters: float | Mapping[str, float]) -> Folding | None:
     """Return the path that folds the m-fold circle, m odd; None where it reaches no free state.
 
     Raises
@@ -59,9 +62,9 @@ def folding(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = N
         The circle itself is singular: kappa_n is a bifurcation.
     """
     problem = HALF_LOOP_BETWEEN_AXES.problem(law)
-    values = {**problem.parameters, "kappa_n": kappa_n, **law.values(nu, Gamma)}
+    values = {**problem.parameters, "kappa_n": kappa_n, **law.values(parameters)}
     system = Collocation(problem, np.linspace(0, 1, _INTERVALS + 1), _DEGREE, _FREE, values)
-    start = HALF_LOOP_BETWEEN_AXES.circle(system, m, kappa_n, law.circle(m, kappa_n, nu, Gamma)["M1"])
+    start = HALF_LOOP_BETWEEN_AXES.circle(system, m, kappa_n, law.circle(m, kappa_n, parameters)["M1"])
     settings = Settings(primary="M2", limits={"M2": (-_LARGEST, _LARGEST)}, zeros={"M2": [0.0]}, max_points=_MOST, errors=False)
     points = trace(point_of(system, start), settings).points
     ends = [i for i, point in enumerate(points) if point.label == "UZ" and i]

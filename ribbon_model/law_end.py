@@ -11,16 +11,10 @@ import numpy as np
 from contin import Event
 from contin.lowlevel import Collocation, Continuation, Trial
 from ribbon_model.equilibrium import moment_on_directors, strains_of
-from ribbon_model.laws import FINITE_WIDTH, RIBBON
-from ribbon_model.material import Material
+from ribbon_model.section import Section
 
 Strains = Callable[[Collocation, np.ndarray], np.ndarray]
 
-#: Why a run ends where its law does.
-_REASONS = {
-    RIBBON.name: "which has no value where the bending or the twisting modulus vanishes; the law 'finite width' goes on",
-    FINITE_WIDTH.name: "whose energy is not convex at larger twist; the law 'flat rod' goes on",
-}
 #: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
 _NEARLY_ENDED = 0.1
 #: The margin is relative to the largest moment, or to this where there is none.
@@ -32,36 +26,33 @@ _ROUNDS = 3
 _PLACES = 17
 
 
-def tests(material: Material, strains: Strains) -> list[Event]:
+def tests(section: Section, strains: Strains) -> list[Event]:
     """Return the test function that ends a run where the law ends; none for a law that is regular everywhere.
 
     Parameters
     ----------
-    material : Material
+    section : Section
     strains : callable
         The strains (K, 3) at the nodes, from a discretized problem and its unknowns.
     """
-    law = material.of_paper
-    if law is None or law.name not in _REASONS:
+    law = section.form
+    if not law.ends:
         return []
-    margin = {
-        RIBBON.name: functools.partial(_ribbon_margin, material),
-        FINITE_WIDTH.name: functools.partial(_convexity, material, strains),
-    }[law.name]
+    margin = functools.partial(_convexity if law.ends_with_convexity else _least_margin, section, strains)
     return [Event("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
 
 
-def explained(material: Material, strains: Strains, run: Continuation) -> str | None:
+def explained(section: Section, strains: Strains, run: Continuation) -> str | None:
     """Return that a run met the end of the law, or failed near it, in a sentence; None for a run that stopped elsewhere."""
-    for test in tests(material, strains):
+    for test in tests(section, strains):
         state, met = run.state, run.stop is not None and run.stop.event == test.name
         if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
-            return f"{test.name}, {_REASONS[material.law]}"
+            return f"{test.name}, {section.form.ends}"
     return None
 
 
-def at_guess(material: Material, times: np.ndarray, frames: np.ndarray) -> str | None:
-    """Return that the law of a ribbon has no value at a first guess, in a sentence; None where it has, and of other laws.
+def at_guess(section: Section, times: np.ndarray, frames: np.ndarray) -> str | None:
+    """Return that the law has no value at a first guess, in a sentence; None where it has.
 
     Parameters
     ----------
@@ -69,19 +60,19 @@ def at_guess(material: Material, times: np.ndarray, frames: np.ndarray) -> str |
     frames : ndarray, shape (K, 4)
         Quaternions of the guess.
     """
-    if material.law != RIBBON.name:
+    if not section.form.has_rulings:
         return None
     bending = strains_of((frames[1:] + frames[:-1]) / 2, np.diff(frames, axis=0) / np.diff(times)[:, None])[:, 0]
     if bending.min() > _LEAST * abs(bending).max():
         return None
     return (
-        f"the law {RIBBON.name!r} has no value where the bending vanishes or is negative, as in this first state; take the law "
-        f"{FINITE_WIDTH.name!r}, which has a Gamma, or a first state that bends to the side of the normal all along"
+        f"the law {section.law.name!r} has no value where the bending vanishes or is negative, as in this first state; take "
+        "the law 'finite width', which has a Gamma, or a first state that bends to the side of the normal all along"
     )
 
 
-def _ribbon_margin(material: Material, trial: Trial) -> float:
-    """Return the least `Material.ribbon_margin` along the strip, over the largest at a node.
+def _least_margin(section: Section, strains: Strains, trial: Trial) -> float:
+    """Return the least `Section.margin` along the strip, over the largest at a node.
 
     The least value is sought between the nodes: a stop at the lowest node would come late by the square of their distance.
     """
@@ -89,9 +80,8 @@ def _ribbon_margin(material: Material, trial: Trial) -> float:
     n = system.problem.dimension
 
     def margins(times: np.ndarray) -> np.ndarray:
-        states = system.evaluate(x, times)
-        M1, _, M3 = moment_on_directors(states.T[:4], states.T[n : n + 4])
-        return np.array([material.ribbon_margin(*at, p) for at in zip(times, M1, M3)])
+        states = system.evaluate(x, times).T
+        return section.margin(times, moment_on_directors(states[:4], states[n : n + 4]).T, np.empty((len(times), 0)), p)
 
     times = system.nodes
     values = margins(times)
@@ -104,16 +94,14 @@ def _ribbon_margin(material: Material, trial: Trial) -> float:
     return float(least / size)
 
 
-def _convexity(material: Material, strains: Strains, trial: Trial) -> float:
-    """Return the least det D2U/(U_11 U_33) at the nodes and halfway between: positive where U is convex."""
-    system, x = trial.system, trial.x
-    p, omega = _numbers(trial), strains(system, x)
+def _convexity(section: Section, strains: Strains, trial: Trial) -> float:
+    """Return the least `Section.margin` at the strains of the nodes and halfway between: at a jump, U is concave there."""
+    omega, t = strains(trial.system, trial.x), trial.system.nodes
     if not np.all(np.isfinite(omega)):
         return -1.0
     places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
-    t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
-    U11, U13, U33 = material.curvatures(t, places, p)
-    return float(np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0).min())
+    t = np.concatenate([t, (t[1:] + t[:-1]) / 2])
+    return float(section.margin(t, np.empty((len(t), 0)), places, _numbers(trial)).min())
 
 
 def _numbers(trial: Trial) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""The natural state of a material, without loads, and where its last end is."""
+"""The natural state of a strip, without loads, and where its last end is."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, LOOSE, PLACE
 from ribbon_model.equilibrium import directors, spin
-from ribbon_model.material import NATURAL, Material
+from ribbon_model.section import NATURAL, Section
 
 
-def states_at(material: Material, t) -> np.ndarray:
+def states_at(section: Section, t) -> np.ndarray:
     """Return quaternion and centreline (K, 7) of the natural state at places t (K,) in [0, 1], from the first frame."""
-    data = [material.datum(name) for name in NATURAL]
-    p, t = SimpleNamespace(**material.parameters), np.atleast_1d(np.asarray(t, dtype=float))
-    if not set(NATURAL) & set(material.along):
+    data = [section.datum(name) for name in NATURAL]
+    p, t = SimpleNamespace(**section.parameters), np.atleast_1d(np.asarray(t, dtype=float))
+    if not set(NATURAL) & set(section.along):
         return _helix(np.array([datum(0.0, p) for datum in data]), t)
     from scipy.integrate import solve_ivp  # takes .5 s, and is needed where natural strains vary only
 
@@ -30,13 +30,13 @@ def states_at(material: Material, t) -> np.ndarray:
     return states
 
 
-def end_numbers(material: Material) -> dict[str, float]:
+def end_numbers(section: Section) -> dict[str, float]:
     """Return place and angles of the last end in the natural state."""
-    if all(material.parameters.get(name, 0) == 0 and name not in material.along for name in NATURAL):
+    if all(section.parameters.get(name, 0) == 0 and name not in section.along for name in NATURAL):
         return {**dict.fromkeys(PLACE + ANGLES, 0.0), "distance": 1.0}
-    state = states_at(material, [1.0])[0]
+    state = states_at(section, [1.0])[0]
     planar = abs(directors(*state[:4])[0] - 1) < LOOSE
-    angles = (0.0, _winding(material), 0.0) if planar else ends.angles_of(state[:4])  # in the plane, the whole angle
+    angles = (0.0, _winding(section), 0.0) if planar else ends.angles_of(state[:4])  # in the plane, the whole angle
     return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
 
 
@@ -51,8 +51,8 @@ def _helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
     return np.hstack([np.cos(half), np.sin(half) * axis, place])
 
 
-def _winding(material: Material) -> float:
+def _winding(section: Section) -> float:
     """Return the whole angle by which the natural state turns about the width: the integral of kappa_n."""
-    datum, p = material.datum("kappa_n"), SimpleNamespace(**material.parameters)
+    datum, p = section.datum("kappa_n"), SimpleNamespace(**section.parameters)
     s, weights = np.polynomial.legendre.leggauss(60)
     return float(sum(w / 2 * datum((x + 1) / 2, p) for x, w in zip(s, weights)))

@@ -57,12 +57,12 @@ class OpenChain(Shown, Chain):
     @property
     def material(self) -> str:
         """The name of the law."""
-        return self.strip.material.law
+        return self.strip.section.law.name
 
     @property
     def free(self) -> list[int]:
         """The components of the strains that may change."""
-        rigid = self.strip.material.constrained and not self.numbers.get("softness", 0.0) > 0
+        rigid = self.strip.section.constrained and not self.numbers.get("softness", 0.0) > 0
         return [0, 2] if rigid else [0, 1, 2]
 
     @cached_property
@@ -82,9 +82,9 @@ class OpenChain(Shown, Chain):
 
     @cached_property
     def density(self):
-        """U, moment and stiffness on the segments; see `Material.strain_energy`."""
+        """U, moment and stiffness on the segments; see `Section.strain_energy`."""
         t = (np.arange(len(self.strains)) + 0.5) * self.segment
-        return self.strip.material.strain_energy(t, self.strains, SimpleNamespace(**self.numbers))
+        return self.strip.section.strain_energy(t, self.strains, SimpleNamespace(**self.numbers))
 
     @cached_property
     def energy(self) -> float:

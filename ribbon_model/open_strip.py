@@ -1,6 +1,6 @@
 """An open strip (or a closed, twisted one) between two ends, under loads: a variational problem from what a person says of it.
 
-The state is the quaternion of the frame and the centreline; the length is 1, and so is B (`ribbon_model.material`). The
+The state is the quaternion of the frame and the centreline; the length is 1, and so is B (`ribbon_model.section`). The
 Hamiltonian is that of the section, H(M), plus n.d3 for the growth of the centreline, minus the potential of distributed
 loads: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), those of the centreline are the force n.
 Conditions at the ends: `ribbon_model.ends`. The reactions are the force and the moment that the supports exert on the strip.
@@ -26,7 +26,7 @@ from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axe
 from ribbon_model.first_guesses import Guess
 from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
-from ribbon_model.material import Material
+from ribbon_model.section import Section
 from ribbon_model.shape import Shape, shape_of
 from ribbon_model.shown import Shown
 
@@ -47,7 +47,7 @@ class OpenStrip(Shown):
 
     Attributes
     ----------
-    material : Material
+    section : Section
     start, finish : End
         What is held. For a closed strip the last end is clamped to the first one, turned by ``turn``.
     numbers : mapping of str to float
@@ -72,14 +72,15 @@ class OpenStrip(Shown):
 
     >>> import contin
     >>> from ribbon_model.ends import FREE_END
-    >>> rod = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    >>> from ribbon_model.laws import ROD
+    >>> rod = Section(ROD, {"B1": 1.0, "B2": 4.0, "C": 0.8})
     >>> column = OpenStrip(rod, finish=FREE_END, numbers={"force_tangent": -1.0})
     >>> branch = contin.trace(column.first_point(), free=["force_tangent"], direction=-1, limits={"force_tangent": (-5, 0)})
     >>> [(round(-point["force_tangent"] / (math.pi / 2) ** 2, 9), point.index_change) for point in branch.labelled("BP")]
     [(1.0, (0, 1))]
     """
 
-    material: Material
+    section: Section
     start: End = CLAMP
     finish: End = CLAMP
     numbers: Mapping[str, float] = field(default_factory=dict)
@@ -115,7 +116,7 @@ class OpenStrip(Shown):
 
     @property
     def known(self) -> tuple[str, ...]:
-        """Names of the numbers that can be given here, besides those of the material."""
+        """Names of the numbers that can be given here, besides those of the section."""
         forces = loads.forces_of(self.finish)
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
         stroke = (STROKE,) if np.any(abs(along) > LOOSE) else ()
@@ -126,13 +127,13 @@ class OpenStrip(Shown):
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
         names = ends.numbers_of(self.finish)
-        natural = {} if set(names) <= set(self.numbers) else natural_state.end_numbers(self.material)
+        natural = {} if set(names) <= set(self.numbers) else natural_state.end_numbers(self.section)
         prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
         if self.roller is not None:
-            place = natural_state.states_at(self.material, [self.roller.at])[0, 4:] @ self.roller.direction
+            place = natural_state.states_at(self.section, [self.roller.at])[0, 4:] @ self.roller.direction
             prescribed["roller"] = self.numbers.get("roller", float(place))
         loaded = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
-        return {**prescribed, **loaded, **self.material.parameters}
+        return {**prescribed, **loaded, **self.section.parameters}
 
     # --- the problem --------------------------------------------------------------------------------------------------
 
@@ -160,7 +161,7 @@ class OpenStrip(Shown):
         return len(self.phases) + (self.roller is not None)
 
     def _hamiltonian(self) -> Callable:
-        section, inside = self.material.hamiltonian(), integral_conditions.densities(self.phases, self.roller)
+        complementary, inside = self.section.hamiltonian(), integral_conditions.densities(self.phases, self.roller)
         potential = loads.distributed(
             self.weight_direction if "weight" in self.numbers else None,
             self.foundation_direction if "foundation" in self.numbers else None,
@@ -171,7 +172,7 @@ class OpenStrip(Shown):
             rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
             M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + inside(t, x, lam[7:], p)
+            return complementary(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + inside(t, x, lam[7:], p)
 
         return hamiltonian
 
@@ -304,13 +305,13 @@ class OpenStrip(Shown):
         if isinstance(guess, Point):
             return None
         if not callable(guess):
-            return law_end.at_guess(self.material, guess[0], guess[1][:, :4])
+            return law_end.at_guess(self.section, guess[0], guess[1][:, :4])
         times = np.linspace(0, 1, 401)
-        return law_end.at_guess(self.material, times, np.array([guess(t)[:4] for t in times]))
+        return law_end.at_guess(self.section, times, np.array([guess(t)[:4] for t in times]))
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
-        return s, np.hstack([natural_state.states_at(self.material, s), np.zeros((len(s), self.conditions_inside))])
+        return s, np.hstack([natural_state.states_at(self.section, s), np.zeros((len(s), self.conditions_inside))])
 
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
@@ -331,13 +332,13 @@ class OpenStrip(Shown):
 
     def _not_found(self) -> str:
         """Return that no first state was found, and which numbers may be nearer to where one is known."""
-        natural = natural_state.end_numbers(self.material)
+        natural = natural_state.end_numbers(self.section)
         far = [name for name, value in natural.items() if abs(self.parameters.get(name, value) - value) > LOOSE]
         loads = [name for name in LOADS if self.parameters.get(name, 0.0) != 0]
         nearer = [f"smaller loads ({', '.join(loads)})"] if loads else []
         nearer += [f"{', '.join(far)} nearer to the natural state"] if far else []
         if self._closed:  # its place and turn are what makes it closed
-            stiff = "a softness (1, say)" if self.material.constrained else "B2 nearer to B1"
+            stiff = "a softness (1, say)" if self.section.constrained else "B2 nearer to B1"
             nearer = [*nearer[: len(loads) > 0], stiff]
         first = f"begin with {' and '.join(nearer)}, and follow them in a stage; or " if nearer else ""
         return f"no equilibrium was found near the first guess; {first}begin with another first state"
@@ -382,21 +383,21 @@ class OpenStrip(Shown):
         small by its nature.
         """
         known = {**self.parameters, **dict(zip((*system.problem.states, *system.free), system.largest(x)))}
-        stiffness = min((known[name] for name in self.material.stiffnesses), default=1.0)
+        stiffness = min((known[name] for name in self.section.stiffnesses), default=1.0)
         forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in LOADS]
         force = max(stiffness, *(abs(known[name]) for name in forces))
-        places = [name for name in known if name not in (*forces, *self.material.parameters)]
+        places = [name for name in known if name not in (*forces, *self.section.parameters)]
         return dict.fromkeys(places, 1.0) | dict.fromkeys(forces, force)
 
     # --- where the law ends -------------------------------------------------------------------------------------------
 
     def domain_tests(self) -> list[Event]:
         """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
-        return law_end.tests(self.material, self.strains)
+        return law_end.tests(self.section, self.strains)
 
     def explained(self, run: Continuation) -> str | None:
         """Return that a run met the end of the law, or failed near it; None for a run that stopped elsewhere."""
-        return law_end.explained(self.material, self.strains, run)
+        return law_end.explained(self.section, self.strains, run)
 
     # --- what a state is ----------------------------------------------------------------------------------------------
 

@@ -20,30 +20,50 @@ from __future__ import annotations
 
 import math
 
-from ribbon_model.finite_width import Section, complementary, ribbon_complementary
+from ribbon_model import finite_width as wide
+from ribbon_model.finite_width import Plate
 
 #: Bending stiffnesses of the plate times the width: along the strip, coupling, across it, twisting.
 RIGIDITIES = ("D11", "D12", "D22", "D66")
 
 
-def section_of(D11, D12, D22, D66, Gamma) -> Section:
-    """Return the section of a strip of an orthotropic plate; Gamma is not read of a ribbon."""
+def plate_of(D11, D12, D22, D66, Gamma=math.inf) -> Plate:
+    """Return the plate in units of D22; Gamma is not read of a ribbon."""
     nu = D12 / D22
     plane = D11 / D22 - nu * nu
-    return Section(nu, plane, 2 * D66 / D22, math.sqrt(D11 / D22), 3 * plane * Gamma * Gamma)
+    return Plate(nu, plane, 2 * D66 / D22, math.sqrt(D11 / D22), 3 * plane * Gamma * Gamma)
 
 
 def flat_rod(M1, M2, M3, kappa_n, D11, D12, D22, D66):
-    """Return H of a flat rod, zero without moments."""
-    return M1 * M1 / (2 * (D11 - D12 * D12 / D22)) + M1 * kappa_n + M3 * M3 / (8 * D66)
+    """Return H of a flat rod."""
+    return M1 * M1 / (2 * (D11 - D12 * D12 / D22)) + M1 * kappa_n + M3 * M3 / (8 * D66) + kappa_n * kappa_n / 2
+
+
+def flat_rod_energy(w1, w2, w3, kappa_n, D11, D12, D22, D66):
+    """Return U of a flat rod."""
+    bent = w1 - kappa_n
+    return (D11 - D12 * D12 / D22) * bent * bent / 2 + 2 * D66 * w3 * w3 - kappa_n * kappa_n / 2
 
 
 def ribbon(M1, M2, M3, kappa_n, D11, D12, D22, D66):
-    """Return H of a ribbon, zero without moments."""
-    section = section_of(D11, D12, D22, D66, math.inf)
-    return D22 * ribbon_complementary(M1 / D22, M3 / D22, kappa_n, section)
+    """Return H of a ribbon."""
+    plate = plate_of(D11, D12, D22, D66)
+    return D22 * wide.ribbon_complementary(M1 / D22, M3 / D22, kappa_n, plate) + kappa_n * kappa_n / 2
+
+
+def ribbon_energy(w1, w2, w3, kappa_n, D11, D12, D22, D66):
+    """Return U of a ribbon, inf for omega_1 <= 0."""
+    if w1 > 0:
+        return D22 * wide.ribbon_energy(w1, w3, kappa_n, plate_of(D11, D12, D22, D66)) - kappa_n * kappa_n / 2
+    return math.inf
 
 
 def finite_width(M1, M2, M3, kappa_n, D11, D12, D22, D66, Gamma):
-    """Return H of a strip of finite width, zero without moments."""
-    return D22 * complementary(M1 / D22, M3 / D22, kappa_n, section_of(D11, D12, D22, D66, Gamma))
+    """Return H of a strip of finite width."""
+    plate = plate_of(D11, D12, D22, D66, Gamma)
+    return D22 * wide.complementary(M1 / D22, M3 / D22, kappa_n, plate) + kappa_n * kappa_n / 2
+
+
+def finite_width_energy(w1, w2, w3, kappa_n, D11, D12, D22, D66, Gamma):
+    """Return U of a strip of finite width."""
+    return D22 * wide.section_energy(w1, w3, kappa_n, plate_of(D11, D12, D22, D66, Gamma)) - kappa_n * kappa_n / 2

@@ -25,10 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.lowlevel import basis, interpolation
-from ribbon_model import linear
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
+from ribbon_model.older import takes_parameters
 from ribbon_model.shape import frames
 from ribbon_model.shown import Shown
 
@@ -77,6 +77,8 @@ class Equilibrium(Shown):
 
     Attributes
     ----------
+    parameters : mapping of str to float
+        The law's, by name.
     directors : callable
         directors(S) for S (K,) gives (K, 3, 3), rows d1, d2, d3 on the lab axes; periodic.
     moment, force : ndarray, shape (3,)
@@ -90,7 +92,7 @@ class Equilibrium(Shown):
     """
 
     law: Law
-    nu: float
+    parameters: Mapping[str, float]
     kappa_n: float
     directors: Callable[[np.ndarray], np.ndarray]
     moment: np.ndarray
@@ -98,11 +100,10 @@ class Equilibrium(Shown):
     symmetry: Symmetry
     mesh: np.ndarray
     degree: int
-    Gamma: float | None = None
 
     def response(self, moment):
         """Return the strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
-        return self.law.linearized(moment, self.kappa_n, *self.law.values(self.nu, self.Gamma).values())
+        return self.law.linearized(moment, self.kappa_n, *self.parameters.values())
 
 
 def coupling(moment, force) -> np.ndarray:
@@ -117,7 +118,8 @@ def cross_matrix(a) -> np.ndarray:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
+@takes_parameters
+def circle(law: Law, parameters: float | Mapping[str, float], m: int, kappa_n: float) -> Equilibrium:
     """Return the planar m-covered circle, on a uniform mesh that resolves the highest wavenumber that can lower the energy.
 
     A wave of wavenumber l has theta ~ u / l. The moment M, along d1, contributes |M| m |K| / l^2 of the stiffness and, where
@@ -135,14 +137,13 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
         normal = np.array([np.sin(angle), -np.cos(angle), zero])  # d2 = d3 x d1
         return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
 
-    moment = np.array([0.0, 0.0, linear.circle(law, m, kappa_n, nu, Gamma)["M1"]])
+    moment = np.array([0.0, 0.0, law.circle(m, kappa_n, parameters)["M1"]])
     piece, symmetry = LENGTH / (2 * m), Symmetry(order=m, mirror=True)
-    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), symmetry, np.array([0, piece]), _CIRCLE_DEGREE, Gamma)
+    known, mesh = law.values(parameters), np.array([0, piece])
+    found = Equilibrium(law, known, kappa_n, directors, moment, np.zeros(3), symmetry, mesh, _CIRCLE_DEGREE)
     strain, compliance = (values[0] for values in found.response(directors(np.zeros(1)) @ moment))
     if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
-        raise ValueError(
-            f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g}, nu = {nu:g} on the root that the law takes"
-        )
+        raise ValueError(f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g} on the root that the law takes")
     softened = abs(moment[2]) * np.linalg.norm(compliance)
     highest = math.sqrt(m * m + m * softened + (0 if law.constrained else softened**2))
     intervals = math.ceil(piece * highest / _PHASE) + 1
@@ -171,8 +172,8 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     moment = np.array([p["M1"], p["M2"], p.get("M3", 0.0)])
     force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
     axes, directors, symmetry = _UNFOLDED[domain](sample, p["length"])
-    loads = axes @ moment, axes @ force
-    return Equilibrium(law, p["nu"], p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, p.get("Gamma"))
+    loads, known = (axes @ moment, axes @ force), {name: p[name] for name in law.parameters}
+    return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree)
 
 
 def _whole(sample, length):

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from contin.lowlevel import Collocation, locate_branch_point
 from ribbon_model.domains import CELL, HALF_LOOP
-from ribbon_model.laws import Law, TwoBendings
+from ribbon_model.law import Law, TwoBendings
 from ribbon_model.linear import circle, thresholds
+from ribbon_model.older import takes_parameters
 
 #: Difference of bendings, relative to that of the circle, up to which they are those of one minimum: it is 1e-9 at most there,
 #: where U is nearly not convex. Two minima differ by more than a tenth.
 _SAME_BENDING = 1e-3
 
 
-def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, degree: int = 4, root: int = 0, Gamma=None):
+@takes_parameters
+def primary_branch(
+    law: Law, m: int, n: int, parameters: float | Mapping[str, float], intervals: int = 10, degree: int = 4, root: int = 0
+):
     """Return the point where the branch (m, n) leaves the m-covered circle, on the cell.
 
     The linear theory gives kappa_n; the discrete equations then give their own branch point there, and the tangent of the
@@ -43,12 +49,15 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     """
     if m % n == 0 and (m // n) % 2 == 0:
         raise ValueError(f"m = {m}, n = {n}: with m / n even the symmetry of the mode does not close the loop")
-    kappa_n = thresholds(law, m, n, nu, Gamma)[root]
-    system = CELL.discretize(law, intervals, degree, law.values(nu, Gamma) | CELL.wave(m, n, kappa_n))
-    return leave_circle(system, CELL.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, nu, Gamma)))
+    kappa_n = thresholds(law, m, n, parameters)[root]
+    system = CELL.discretize(law, intervals, degree, law.values(parameters) | CELL.wave(m, n, kappa_n))
+    return leave_circle(system, CELL.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, parameters)))
 
 
-def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
+@takes_parameters
+def half_loop_branch(
+    law: Law, m: int, n: int, parameters: float | Mapping[str, float], intervals: int = 40, degree: int = 4, root: int = 0
+):
     """Return the same as `primary_branch` on the half loop, which has all wavenumbers.
 
     Examples
@@ -58,12 +67,12 @@ def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, d
     >>> round(float(x[system.parameter_index("kappa_n")]), 9)
     2.5
     """
-    kappa_n = thresholds(law, m, n, nu, Gamma)[root]
-    system = HALF_LOOP.discretize(law, intervals, degree, law.values(nu, Gamma))
-    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, nu, Gamma)))
+    kappa_n = thresholds(law, m, n, parameters)[root]
+    system = HALF_LOOP.discretize(law, intervals, degree, law.values(parameters))
+    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, parameters)))
 
 
-def _moment(law: Law, m: int, n: int, kappa_n: float, nu: float, Gamma: float | None) -> float:
+def _moment(law: Law, m: int, n: int, kappa_n: float, parameters: float | Mapping[str, float]) -> float:
     """Return the moment of a circle where its branch begins.
 
     Raises
@@ -71,8 +80,8 @@ def _moment(law: Law, m: int, n: int, kappa_n: float, nu: float, Gamma: float | 
     TwoBendings
         The law has another bending for it.
     """
-    moment: float = circle(law, m, kappa_n, nu, Gamma)["M1"]
-    bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(nu, Gamma).values())[0][0, 0]
+    moment: float = circle(law, m, kappa_n, parameters)["M1"]
+    bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(parameters).values())[0][0, 0]
     if not abs(bending - m) < _SAME_BENDING * m:
         raise TwoBendings(
             f"m = {m}, n = {n}: the strain energy of the circle where the branch begins, at kappa_n = {kappa_n:.6g}, has two "

@@ -9,13 +9,14 @@ with omega_2 = 0 the unknowns are omega_1 and omega_3.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
 from ribbon_model.shown import Shown
@@ -166,18 +167,17 @@ class Strip(Shown, Chain):
     Attributes
     ----------
     law : Law
-    nu, kappa_n : float
+    parameters : mapping of str to float, or float
+        The law's, by name; a number is the first one.
+    kappa_n : float
     strains : ndarray, shape (N, 3)
         Components of omega on the directors, segment by segment.
-    Gamma : float, optional
-        Gamma of a law that has one.
     """
 
     law: Law
-    nu: float
+    parameters: float | Mapping[str, float]
     kappa_n: float
     strains: np.ndarray
-    Gamma: float | None = None
 
     @property
     def first(self) -> np.ndarray:
@@ -192,7 +192,7 @@ class Strip(Shown, Chain):
     @property
     def free(self) -> list[int]:
         """The components of the strains that may change."""
-        return [0, 2] if self.law.constrained else [0, 1, 2]
+        return self.law.free
 
     @property
     def size(self) -> int:
@@ -212,7 +212,7 @@ class Strip(Shown, Chain):
     @property
     def _material(self) -> tuple[float, ...]:
         """kappa_n and the law's parameters."""
-        return self.kappa_n, *self.law.values(self.nu, self.Gamma).values()
+        return self.kappa_n, *self.law.values(self.parameters).values()
 
     @cached_property
     def energy(self) -> float:
@@ -325,5 +325,5 @@ def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
     edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)
     moment = equilibrium.moment - np.cross(edges - directors[:, 2] * (LENGTH / segments / 2), equilibrium.force)
     strains = equilibrium.response(np.einsum("kij,kj->ki", directors, moment))[0]
-    strip = Strip(equilibrium.law, equilibrium.nu, equilibrium.kappa_n, strains, equilibrium.Gamma)
+    strip = Strip(equilibrium.law, equilibrium.parameters, equilibrium.kappa_n, strains)
     return strip.moved(np.zeros(segments * len(strip.free)))

@@ -12,7 +12,7 @@ from contin.lowlevel import Collocation
 from ribbon_model import stability
 from ribbon_model.domains import CELL, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH, on_directors
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, from_solution
 from ribbon_model.shape import Shape, frames, interpolated, quadrature_centreline, quaternions
 from ribbon_model.shown import Shown
@@ -41,7 +41,7 @@ class Solution(Shown):
     >>> import contin
     >>> from ribbon_model.laws import RIBBON
     >>> from ribbon_model.seeds import primary_branch
-    >>> system, x, tangent = primary_branch(RIBBON, 1, 2, nu=0.3, intervals=10, degree=7)
+    >>> system, x, tangent = primary_branch(RIBBON, 1, 2, 0.3, intervals=10, degree=7)
     >>> point = contin.trace(contin.lowlevel.point_of(system, x), contin.Settings(max_points=4), tangent=tangent).points[-1]
     >>> solution = Solution.of(point)
     >>> solution.domain, solution.shape().closure() < 1e-9, solution.index().index

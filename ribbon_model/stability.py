@@ -189,7 +189,7 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     momentum = equilibrium.moment + np.cross(origin, equilibrium.force)
     moment = np.einsum("kij,kj->ki", d, momentum - np.cross(x, equilibrium.force))
     strain, compliance = equilibrium.response(moment)
-    free = [0, 2] if equilibrium.law.constrained else [0, 1, 2]
+    free = equilibrium.law.free
     try:
         factor = np.linalg.cholesky(compliance[:, free][:, :, free])
     except np.linalg.LinAlgError as error:

@@ -64,6 +64,11 @@ class Strip:
         return self.width**2 / (self.thickness * self.radius(1.0))
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters of the law 'finite width', by name."""
+        return {"nu": self.poisson_ratio, "Gamma": self.Gamma}
+
+    @property
     def kappa_n(self) -> float:
         """Natural curvature over 2 pi/L."""
         return self.radius(1.0) / self.natural_radius

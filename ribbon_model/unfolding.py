@@ -9,8 +9,8 @@ The strip has the natural curvature kappa_n and spans theta_n = L kappa_n; turni
   and one for those with psi_2 odd: det S = -8 (1 - xi)**4 even odd / t. It is written in units of the natural radius 1/kappa_n,
   where only the law becomes singular.
 
-For the law 'finite width' every function takes ``width`` = w**2 kappa_n / h, that is w**2/(R h) with the natural radius R: the
-Gamma of these units. Its t may vanish twice in 0 < xi < 1, or not at all; for small widths it never does.
+The argument ``parameters`` has those of the law by name, in units of the natural radius R (the Gamma of the law 'finite width'
+is w**2/(R h)); a number is the first one. Its t may vanish twice in 0 < xi < 1, or not at all; for small widths it never does.
 
 xi = 1, the flat strip, is a singular point of the scaling in (20): the interval shrinks to nothing and both forms vanish there
 with a power of 1 - xi, for any kind of strip. It is not a root. `first_root` leaves |1 - xi| < `FLAT` out.
@@ -19,28 +19,34 @@ with a power of 1 - xi, for any kind of strip. It is not a root. `first_root` le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ribbon_model.laws import Law
+from ribbon_model.law import Law
+from ribbon_model.older import takes_parameters
 
 #: Half width in xi of the interval around the flat state that is left out; the flat state is not a root.
 FLAT = 0.01
+#: Smallest 1 - xi at which a zero of t is looked for; it is of the order of 1/Gamma of the law 'finite width'.
+_FLATTEST = 1e-7
+#: Places from 1 down to that: 300 a decade. Two zeros of t nearer than 0.8 % of 1 - xi are missed.
+_PLACES = 2101
 #: Conditions at both ends, by the number of the state in (x_1, psi_2, psi_3, M_2, M_3, R_1) that vanishes there.
 CLAMPED = (0, 1, 2)
 HINGED = (0, 2, 3)
 
 
-def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
-    """Return the matrix of (20), y' = matrix y with y = (x_1, psi_2, psi_3, M_2, M_3, R_1); shape (..., 6, 6) with nu and xi.
+@takes_parameters
+def system_matrix(law: Law, parameters, xi) -> np.ndarray:
+    """Return the matrix of (20), y' = matrix y with y = (x_1, psi_2, psi_3, M_2, M_3, R_1); shape (..., 6, 6).
 
     For g infinite (20b) is psi_2' = psi_3: M_2 is then a reaction, determined by (20d) to (20f).
 
     Raises
     ------
     ValueError
-        xi = 1 (no radius), the ribbon at xi = 1 - nu (t = 0), or a law that is not in Table 2.
+        xi = 1 (no radius), or t = 0 (the ribbon at xi = 1 - nu).
 
     Examples
     --------
@@ -48,15 +54,15 @@ def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
     >>> system_matrix(RIBBON, 0.3, 0.5).shape
     (6, 6)
     """
-    nu, xi = np.broadcast_arrays(np.asarray(nu, float), np.asarray(xi, float))
+    values = law.named(parameters)
+    xi, *_ = np.broadcast_arrays(np.asarray(xi, float), *values.values())
     if np.any(xi == 1):
         raise ValueError("xi = 1 is the flat strip: it has no radius to scale lengths with")
-    ratio = 1 / (1 - xi)  # kappa_n r0
-    local = None if width is None else width * (1 - xi)
-    g, t = law.tangent_moduli(ratio, nu, local)
+    radius = 1 / (1 - xi)
+    circle = law.on_circle(1.0, radius, *law.scaled(values, radius).values())
+    moment, g, t = circle.moment, circle.contrast, circle.twisting  # the moment: (17a)
     if np.any(t == 0):
         raise ValueError("the tangent twisting modulus vanishes: (20c) cannot be solved for psi_3'")
-    moment = law.prestress(ratio, nu, local)  # (17a)
     matrix = np.zeros((*xi.shape, 6, 6))
     matrix[..., 0, 1] = 1  # (20a)
     matrix[..., 1, 2], matrix[..., 1, 3] = 1 - moment / g, 1 / g  # (20b)
@@ -65,8 +71,9 @@ def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
     return matrix
 
 
-def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPED, width: float | None = None) -> np.ndarray:
-    """Return det S(theta_n, nu, xi) of section 5.3, by the matrix exponential; shape of nu and xi broadcast.
+@takes_parameters
+def shooting_determinant(law: Law, parameters, xi, theta_n: float = math.pi, ends=CLAMPED) -> np.ndarray:
+    """Return det S(theta_n, nu, xi) of section 5.3, by the matrix exponential; shape of xi and parameters broadcast.
 
     Parameters
     ----------
@@ -88,13 +95,14 @@ def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPE
     from scipy.linalg import expm
 
     xi = np.asarray(xi, float)
-    transfer = expm(system_matrix(law, nu, xi, width) * (theta_n * (1 - xi))[..., None, None])
+    transfer = expm(system_matrix(law, parameters, xi) * (theta_n * (1 - xi))[..., None, None])
     free = [i for i in range(6) if i not in ends]
     return np.linalg.det(transfer[..., np.array(ends)[:, None], np.array(free)])
 
 
-def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factors (even, odd) of the determinant with (20g), in closed form; shape of nu and xi broadcast.
+@takes_parameters
+def factors(law: Law, parameters, xi, theta_n: float = math.pi) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factors (even, odd) of the determinant with (20g), in closed form; shape of xi and parameters broadcast.
 
     With curvature kappa = 1 - xi, moment M = kappa - 1 (times B kappa_n), torsional stiffness T = t kappa, half length H and
 
@@ -111,7 +119,7 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = No
     Raises
     ------
     ValueError
-        xi = 0 or a law that is not in Table 2. Where T = 0 (the ribbon at xi = 1 - nu) the result is not a number.
+        xi = 0. Where T = 0 (the ribbon at xi = 1 - nu) the result is not a number.
 
     Examples
     --------
@@ -120,12 +128,14 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = No
     >>> min(abs(float(factor)) for factor in factors(RIBBON, 0.3, root)) < 1e-9
     True
     """
-    nu, xi = np.broadcast_arrays(np.asarray(nu, float), np.asarray(xi, float))
+    values = law.named(parameters)
+    xi, *_ = np.broadcast_arrays(np.asarray(xi, float), *values.values())
     if np.any(xi == 0):
         raise ValueError("xi = 0 is the natural state: nothing to divide by")
     kappa, half = 1 - xi, theta_n / 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        g, moment, torsion, compliance = law.arc(xi, nu, width)
+        circle = law.on_circle(kappa, 1.0, *values.values())
+        moment, g, torsion, compliance = circle.moment, circle.contrast, circle.twisting * kappa, 1 / circle.twisting
     bending = kappa - moment / g
     with np.errstate(divide="ignore", invalid="ignore"):
         w_squared = bending * (torsion - moment) * compliance
@@ -150,24 +160,23 @@ def _trigonometric(w_squared, half):
     return cosine, sine, np.where(np.abs(z) < 0.02, series, direct)
 
 
+@takes_parameters
 def first_root(
     law: Law,
-    nu: float,
+    parameters: float | Mapping[str, float],
     theta_n: float = math.pi,
     ends: tuple[int, int, int] = CLAMPED,
     largest: float = 6.0,
     method: str = "closed form",
-    width: float | None = None,
 ) -> float | None:
     """Return the smallest xi > 0 with a marginal out-of-plane mode of the arc, to about 1e-12, or None below ``largest``.
 
     Sign changes are bracketed on a fixed grid and closed in by Brent's method, in each factor separately or in the determinant.
 
     - The flat state xi = 1 is left out.
-    - Ribbon, nu > 0: roots accumulate at xi = 1 - nu from below, where t = 0; the grid gets finer towards it and ends there.
-      Beyond, t < 0 and every high wavenumber is unstable.
-    - Finite width: the same at the first zero of t, if there is one in 0 < xi < 1.
-    - Ribbon, nu < 0: the search ends at the flat state, beyond which t < 0. (There is no root: None.)
+    - Roots accumulate below the first zero of t in 0 < xi < 1, if there is one (ribbon, nu > 0: xi = 1 - nu); the grid gets
+      finer towards it and ends there. Beyond, t < 0 and every high wavenumber is unstable.
+    - The search ends at the flat state if t < 0 beyond it (ribbon, nu < 0: there is no root, None).
 
     Parameters
     ----------
@@ -175,14 +184,11 @@ def first_root(
         `CLAMPED`, (20g), or `HINGED`, for the shooting method only.
     method : str
         'closed form' (`factors`) or 'shooting' (`shooting_determinant`).
-    width : float, optional
-        w**2/(R h), for the law 'finite width' only.
 
     Raises
     ------
     ValueError
-        As `Law.values` for the width; nu outside (-1, 1), theta_n or ``largest`` not positive, an unknown method,
-        `HINGED` with the closed form, or a
+        See `Law.values`; theta_n or ``largest`` not positive, an unknown method, `HINGED` with the closed form, or a
         determinant that is zero throughout (isotropic rod with `HINGED` ends, nu = 0, where t = g).
 
     Examples
@@ -193,18 +199,16 @@ def first_root(
     """
     from scipy.optimize import brentq
 
-    if not (-1 < nu < 1 and theta_n > 0 and largest > 0):
-        raise ValueError(f"nu = {nu:g}, theta_n = {theta_n:g}, largest = {largest:g}: outside the range of the search")
-    law.values(nu, width)
-    found, end = [], law.arc_end(nu, width)
-    for low, high in _pieces(law, nu, largest, end):
-        for function in _functions(law, nu, theta_n, ends, method, width):
+    if not (theta_n > 0 and largest > 0):
+        raise ValueError(f"theta_n = {theta_n:g}, largest = {largest:g}: must be positive")
+    known = law.values(parameters)
+    found, end = [], _zero_of_t(law, known)
+    for low, high in _pieces(law, known, largest, end):
+        for function in _functions(law, known, theta_n, ends, method):
             grid = _grid(low, high, end)
             values = function(grid)
             if not np.max(np.abs(values)) > 1e-12:
-                raise ValueError(
-                    f"{law.name}, nu = {nu:g}: the determinant vanishes for every xi, these ends leave a mechanism"
-                )
+                raise ValueError(f"{law.name}: the determinant vanishes for every xi, these ends leave a mechanism")
             for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) <= 0)[:1]:
                 found.append(brentq(lambda xi, f=function: float(f(xi)), grid[i], grid[i + 1], xtol=1e-14, rtol=1e-14))
         if found:
@@ -212,23 +216,35 @@ def first_root(
     return None
 
 
-def _functions(law, nu, theta_n, ends, method, width) -> list[Callable]:
+def _functions(law: Law, values, theta_n, ends, method) -> list[Callable]:
     """Return the functions of xi whose zeros are the modes."""
     if method == "shooting":  # det S has the factor (1 - xi)**4 / t
-        return [lambda xi: shooting_determinant(law, nu, xi, theta_n, ends, width) / (1 - np.asarray(xi)) ** 4]
+        return [lambda xi: shooting_determinant(law, values, xi, theta_n, ends) / (1 - np.asarray(xi)) ** 4]
     if method != "closed form":
         raise ValueError(f"method {method!r}: 'closed form' or 'shooting'")
     if ends != CLAMPED:
         raise ValueError("the closed form is for the ends (20g); use the method 'shooting'")
-    return [lambda xi, i=i: factors(law, nu, xi, theta_n, width)[i] for i in (0, 1)]
+    return [lambda xi, i=i: factors(law, values, xi, theta_n)[i] for i in (0, 1)]
 
 
-def _pieces(law, nu, largest, singular):
+def _zero_of_t(law: Law, values) -> float | None:
+    """Return the smallest xi in (0, 1) where t vanishes, or None."""
+    from scipy.optimize import brentq
+
+    def t(xi):
+        return law.on_circle(1 - xi, 1.0, *values.values()).twisting
+
+    grid = 1 - np.geomspace(1.0, _FLATTEST, _PLACES)
+    below = np.flatnonzero(t(grid) + 0 * grid < 0)
+    return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
+
+
+def _pieces(law: Law, values, largest, singular):
     """Return the intervals of xi without a singular point inside."""
     if singular is not None:
         return [(0.0, min(largest, singular))]
     pieces = [(0.0, min(largest, 1 - FLAT))]
-    if largest > 1 + FLAT and law.passes_flat(nu):
+    if largest > 1 + FLAT and law.on_circle(-FLAT, 1.0, *values.values()).twisting > 0:
         pieces.append((1 + FLAT, largest))
     return pieces
 

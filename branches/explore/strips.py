@@ -72,7 +72,7 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
     if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
         raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
-    marks = [_mark(event, branch.reason, bool(config["origin"])) for event in branch.events]
+    marks = [_mark(event, branch.reason, config) for event in branch.events]
     about = {
         "family": _family(config), "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
         "title": config["title"], "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"),
@@ -110,15 +110,16 @@ def family_of(branches: list[dict]) -> dict:
 # --- branches -----------------------------------------------------------------------------------------------------
 
 
-def _mark(event, reason: str, secondary: bool) -> dict:
+def _mark(event, reason: str, config: dict) -> dict:
     """A labelled point: its number, kind, and what it is called; kappa_n where it is on a circle."""
     name, place = event["name"].decode(), {"point": int(event["point"])}
     values = {column: float(event[column]) for column in _MAP}
     if not all(map(math.isfinite, values.values())):
         raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
-    kind = kind_of(event["label"].decode(), name, reason, secondary)
+    kind = kind_of(event["label"].decode(), name, reason, bool(config["origin"]))
     if kind == "circle":
-        return place | {"kind": kind, "covering": covering(**values), "kappa_n": values["kappa_n"]}
+        index = covering(LAWS[config["law"]], {"nu": config["nu"], "Gamma": config["Gamma"]}, **values)
+        return place | {"kind": kind, "covering": index, "kappa_n": values["kappa_n"]}
     return place | {"kind": ON_PAGE.get(kind, "end"), "name": name}
 
 
@@ -160,20 +161,21 @@ def _channels(problem, solution: Solution, t: np.ndarray) -> np.ndarray:
 def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations: list[dict]) -> dict:
     """The planar m-covered circle, with its bifurcations among its points."""
     material, Gamma = from_label(law)
+    parameters = {"nu": nu, "Gamma": Gamma}
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
-        neutral += [m * end for end in energy_interval(material, m, nu, Gamma) if ends[0] < m * end < ends[1]]
+        neutral += [m * end for end in energy_interval(material, m, parameters) if ends[0] < m * end < ends[1]]
     kappa_n = np.unique(np.round(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral), 9))
     kappa_n = np.sort(np.append(kappa_n, (kappa_n[1:] + kappa_n[:-1]) / 2))  # one between any two neutral ones
-    values = [circle(material, m, k, nu, Gamma) for k in kappa_n]
-    columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, nu, Gamma, neutral) for k in kappa_n]}
+    values = [circle(material, m, k, parameters) for k in kappa_n]
+    columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, parameters, neutral) for k in kappa_n]}
     columns |= {name: [value[name] for value in values] for name in ("kappa_star", "energy")}
     return {"m": m, "columns": {name: column(np.array(columns[name])) for name in CIRCLE_COLUMNS}}
 
 
-def _circle_index(law, m, kappa_n, nu, Gamma, neutral) -> int:
+def _circle_index(law, m, kappa_n, parameters, neutral) -> int:
     # curled against its natural curvature (m < 1) the linear theory at hand does not count
     if m < 1 or np.isclose(kappa_n, neutral, rtol=0, atol=1e-8).any():
         return UNKNOWN
-    count = index(law, m, kappa_n, nu, Gamma)
+    count = index(law, m, kappa_n, parameters)
     return INFINITE if math.isinf(count) else int(count)

@@ -12,7 +12,7 @@ from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, k
 from branches.paper.page import Row, Section
 from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
-from ribbon_model.linear import energy_interval, stability_interval
+from ribbon_model.linear import convex_limits, energy_interval, stability_interval
 
 NU = 0.3
 COVERINGS = (1, 3, 5, 7)
@@ -149,7 +149,7 @@ def _region(axes, law, window, top):
         axes.contour(ratio, k, np.where(k > 0, c, np.nan), [0], colors="k", linewidths=1.6, linestyles=":")
         hidden = np.where((c < 0) & ~unstable & (k > 0), 1.0, np.nan)
         axes.contourf(ratio, k, np.nan_to_num(hidden), [0.5, 1.5], colors="none", hatches=["xxxx"])
-    for limit in law.convex_limits(1, NU):
+    for limit in filter(math.isfinite, convex_limits(law, 1, NU)):
         axes.axvline(limit, color="k", lw=1.6, ls="--")
     axes.set(xlim=window)
 

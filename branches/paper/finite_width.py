@@ -41,7 +41,7 @@ def finite_width(folder: Path) -> Section:
     rows = [Row(f"threshold of ({m}, {n}) at Γ = {G:g}: κₙL/2π =", "", threshold(m, n, G)) for m, n in MODES for G in GAMMAS]
     worst = 0.0
     for Gamma in CHECKED:
-        (known,) = exact.folds(1, 2, NU, (-100, 100), "finite width", Gamma=Gamma)
+        (known,) = exact.folds(1, 2, {"nu": NU, "Gamma": Gamma}, (-100, 100), "finite width")
         found = next(kappa_n for G, kappa_n in fold if abs(G / Gamma - 1) < 1e-9)
         worst = max(worst, abs(found - known.kappa_n))
         rows.append(Row(f"fold of (1, 2) at Γ = {Gamma:g}: κₙL/2π =", "", f"{found:.10f}"))
@@ -69,7 +69,7 @@ def finite_width(folder: Path) -> Section:
 def threshold(m: int, n: int, Gamma: float) -> float:
     """kappa_n where (m, n) leaves the m-covered circle; nan where it does not."""
     try:
-        return thresholds(FINITE_WIDTH, m, n, NU, Gamma)[0]
+        return thresholds(FINITE_WIDTH, m, n, {"nu": NU, "Gamma": Gamma})[0]
     except ValueError:
         return float("nan")
 
@@ -82,7 +82,7 @@ def _near_ribbon() -> float:
 
 def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     """(Gamma, kappa_n) of the fold of (1, 2), shape (K, 2), Gamma ascending; and of the place where it is born."""
-    system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, NU, 10, 7, Gamma=10.0)
+    system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, {"nu": NU, "Gamma": 10.0}, 10, 7)
     branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
     fold = branch.labelled("LP")[0]
     limits = {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}

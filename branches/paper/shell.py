@@ -44,7 +44,7 @@ def fig7(folder: Path) -> Section:
 
 def law_root(nu: float, number: float, largest: float = 1 - FLAT) -> float | None:
     """The first root of the law 'finite width'; beyond the flat state only if ``largest`` is."""
-    return first_root(FINITE_WIDTH, nu, width=number, largest=largest)
+    return first_root(FINITE_WIDTH, {"nu": nu, "Gamma": number}, largest=largest)
 
 
 def _order(outcome: Outcome):

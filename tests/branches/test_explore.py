@@ -483,7 +483,7 @@ def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
     browser.open(pages / "m1_n2.html")
     for law, nu, Gamma in EXACT:
         for m, n in ((1, 2), (3, 4)) if Gamma is None else ((1, 2),):  # the model takes seconds for a branch of finite width
-            curve = exact.curve(m, n, nu, step=0.2, law=law, Gamma=Gamma)
+            curve = exact.curve(m, n, {"nu": nu, "Gamma": Gamma}, step=0.2, law=law)
             found = browser.js(f"explore.exactCurve({law!r}, {m}, {n}, {nu}, [-100, 100], {json.dumps(Gamma)})")
             for point in found["points"][2:-1:25]:
                 near = min(curve, key=lambda one: math.dist(*[[at["kappa_n"], at["kappa_star"]] for at in (vars(one), point)]))

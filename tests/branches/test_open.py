@@ -330,7 +330,7 @@ def test_a_table_and_a_taper():
     text = "material: {law: flat rod, nu: 0.3}\nfinish: free\ndirections: {weight: [-1, 0, 0]}\n"
     text += "stages: [{follow: weight, to: 25}]\n"
     tapered = parse(text + "along: {width: [[0, 1], [0.5, 0.75], [1, 0.5]]}\n", "scene")
-    width = tapered.strip().material.datum("width")
+    width = tapered.strip().section.datum("width")
     assert [width(s, None) for s in (0, 0.25, 1)] == pytest.approx([1, 0.875, 0.5])
     found = []
     for config in (parse(text, "scene"), tapered):

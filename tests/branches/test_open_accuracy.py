@@ -101,7 +101,7 @@ def test_dimensions_go_with_the_laws_of_flat_strips(law, modulus, tmp_path):
         scene = scene.replace("kappa_n: 0.001", "kappa_n: 5")
         config = parse(f"{scene}stages: [{{follow: force_tangent, to: -0.1}}]\n", "s")
         assert config.modulus == pytest.approx(modulus, rel=1e-14)
-        assert config.strip().material.numbers["nu"] == 0.3 and config.strip().material.numbers["kappa_n"] == pytest.approx(2)
+        assert config.strip().section.numbers["nu"] == 0.3 and config.strip().section.numbers["kappa_n"] == pytest.approx(2)
         return
     _, branch = followed(f"{scene}stages: [{{follow: force_tangent, to: -0.5}}]\n", tmp_path)
     loads = [event["force_tangent"] for event in branch.events if event["label"] == b"BP"]

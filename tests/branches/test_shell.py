@@ -16,7 +16,6 @@ from branches.files import StoreError
 from branches.paper.shell import fig7
 from branches.shell import Case, Unusable, compute, first_root, grid, read, run_ccx, solve
 from branches.shell_deck import RADIUS, Strip, direct_deck, states, thermal_deck
-from ribbon_model.finite_width import strain_energy
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.unfolding import first_root as law_root
 
@@ -260,14 +259,15 @@ def test_the_laws_root_by_a_third_way(nu, number):
 
     def lowest(xi):
         kappa = 1 - xi
-        _, U1, _, _, _, U33, *_ = strain_energy(kappa, 0.0, 1.0, nu, number)
+        circle = FINITE_WIDTH.on_circle(kappa, 1.0, nu, number)
+        U1, U33 = circle.moment, circle.twisting
         twist = curved / kappa + kappa * psi
         form = (twist * weights) @ (U33 * twist - U1 * psi).T
         form, norm = (complement @ (matrix + matrix.T) @ complement.T for matrix in (form, (twist * weights) @ twist.T))
         factor = np.linalg.inv(np.linalg.cholesky(norm))
         return np.linalg.eigvalsh(factor @ form @ factor.T)[0]
 
-    root = law_root(FINITE_WIDTH, nu, width=number, largest=0.99)
+    root = law_root(FINITE_WIDTH, {"nu": nu, "Gamma": number}, largest=0.99)
     assert brentq(lowest, root - 0.02, root + 0.004, xtol=1e-11) == pytest.approx(root, abs=1e-8)
 
 
@@ -280,7 +280,7 @@ def test_a_strip_of_solid_elements_loses_stability_where_the_law_says():
     """R/w = 4, w**2/(R h) = 75, on a coarse mesh: within 2 % of the law of finite width, whose own error is of order w/R."""
     outcome = solve(Case("thermal", 0.3, 4.0, 300.0, 30, 4, first=0.74, last=0.84, step=0.05))
     assert outcome.problem == ""
-    assert outcome.root == pytest.approx(law_root(FINITE_WIDTH, 0.3, width=75.0, largest=0.99), rel=0.02)
+    assert outcome.root == pytest.approx(law_root(FINITE_WIDTH, {"nu": 0.3, "Gamma": 75.0}, largest=0.99), rel=0.02)
 
 
 @needs_ccx

@@ -117,13 +117,13 @@ def test_buckled_states_are_those_of_the_quadrature():
     states, folds, lost = buckled(TAPE)
     (stable,) = (state for state in states if state.stable)
     assert stable.name == "buckled (1, 2)"
-    points = curve(1, 2, 0.3, TAPE.Gamma, kappa_limits=(-100.0, TAPE.kappa_n))
+    points = curve(1, 2, TAPE.parameters, kappa_limits=(-100.0, TAPE.kappa_n))
     assert points[-1].label == "EP"
     energy = (points[-1].energy + TAPE.kappa_n**2 / 2) * TAPE.energy_unit
     assert stable.energy == pytest.approx(energy, rel=1e-8)
-    (fold,) = (point for point in curve(1, 2, 0.3, TAPE.Gamma) if point.label == "LP")
+    (fold,) = (point for point in curve(1, 2, TAPE.parameters) if point.label == "LP")
     assert folds[0][1] == pytest.approx(fold.kappa_n, abs=1e-9)
-    assert TAPE.kappa_n > thresholds(FINITE_WIDTH, 1, 2, 0.3, TAPE.Gamma)[0]
+    assert TAPE.kappa_n > thresholds(FINITE_WIDTH, 1, 2, TAPE.parameters)[0]
 
 
 def test_the_strain_is_the_largest_principal_one():
@@ -134,7 +134,7 @@ def test_the_strain_is_the_largest_principal_one():
 
 def saddle_energy(strip, m, n):
     """Return the energy in J of the state at kappa_n on a primary branch that starts above it, by its quadrature."""
-    end = curve(m, n, strip.poisson_ratio, strip.Gamma, kappa_limits=(strip.kappa_n, 100.0))[-1]
+    end = curve(m, n, strip.parameters, kappa_limits=(strip.kappa_n, 100.0))[-1]
     assert end.label == "EP"
     return (end.energy + strip.kappa_n**2 / 2) * strip.energy_unit
 

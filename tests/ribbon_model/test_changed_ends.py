@@ -9,11 +9,11 @@ import contin
 from ribbon_model.changed_ends import angles_near, with_ends
 from ribbon_model.ends import BALL, CLAMP, DIRECTIONS, End, hinge, prescribed
 from ribbon_model.loads import replacing_loads
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
-ROD = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
 
 
 def released(before, finish):

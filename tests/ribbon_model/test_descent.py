@@ -235,7 +235,7 @@ def test_what_is_refused():
         descend(strip, "mass")
     with pytest.raises(ValueError, match="omega_1 must be positive"):
         descend(replace(strip, strains=-strip.strains))
-    with pytest.raises(ValueError, match="Gamma is missing"):
+    with pytest.raises(ValueError, match="Gamma: is missing"):
         replace(strip, law=FINITE_WIDTH).energy  # noqa: B018
     with pytest.raises(ValueError, match="cannot be closed"):
         replace(strip, strains=1.3 * strip.strains).moved(np.zeros(96))
@@ -246,7 +246,7 @@ def test_what_is_refused():
 )
 def test_a_strip_of_finite_width_comes_to_rest(m, kappa_n, where):
     """On a circle its energy is a closed form; on a primary branch the quadrature knows it."""
-    start = discretized(second_variation.circle(FINITE_WIDTH, NU, m, kappa_n, Gamma=30.0), 96)
+    start = discretized(second_variation.circle(FINITE_WIDTH, {"nu": NU, "Gamma": 30.0}, m, kappa_n), 96)
     descent = descend(perturbed(start, 0.02))
     rest = identify(descent.end)
     assert descent.rests and str(rest) == where and rest.stability.index == 0

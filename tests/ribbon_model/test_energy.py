@@ -9,6 +9,7 @@ from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES
 from ribbon_model.energy import variational_problem
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FINITE_WIDTH, PAPER_LAWS, RIBBON
+from ribbon_model.linear import thresholds
 from ribbon_model.seeds import primary_branch
 from ribbon_model.solution import Solution
 
@@ -79,9 +80,9 @@ def test_what_has_no_such_statement():
 
 @pytest.mark.full
 def test_a_law_that_states_its_gradient():
-    """Finite width: the circle's bifurcation is that of the linear theory (`FiniteWidth.thresholds`)."""
+    """Finite width: the circle's bifurcation is that of the linear theory ."""
     problem, Gamma = variational_problem(FINITE_WIDTH, HALF_LOOP), 10.0
-    (threshold,) = FINITE_WIDTH.thresholds(1, 2, NU, Gamma)
+    (threshold,) = thresholds(FINITE_WIDTH, 1, 2, {"nu": NU, "Gamma": Gamma})
     start = contin.solve(
         problem, lambda t: (np.cos(t / 2), np.sin(t / 2), 0, 0, 0, np.cos(t) - 1, np.sin(t)), {"kappa_n": 3.2, "Gamma": Gamma}
     )

@@ -21,8 +21,20 @@ from ribbon_model.unfolding import factors, first_root, shooting_determinant
 NU = 0.3
 
 
+def wide(Gamma):
+    return {"nu": NU, "Gamma": Gamma}
+
+
+def derivatives(w1, w3, kappa_n, Gamma):
+    """(U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), U without the term -kappa_n**2/2."""
+    strain = np.stack(np.broadcast_arrays(w1, 0.0, w3), axis=-1)
+    U, d, dd = FINITE_WIDTH.derivatives(strain, kappa_n, NU, Gamma)
+    mixed = (dd[..., i, j] for i, j in ((0, 0), (0, 2), (2, 2)))
+    return np.array([U + kappa_n**2 / 2, d[..., 0], d[..., 2], *mixed, d[..., 3] + kappa_n, dd[..., 0, 3], dd[..., 2, 3]])
+
+
 def followed(m, n, Gamma, **settings):
-    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, NU, 10, 7, Gamma=Gamma)
+    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, wide(Gamma), 10, 7)
     return trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, **settings), tangent=tangent)
 
 
@@ -35,7 +47,7 @@ def moments(random, Gamma):
     """Random strains away from omega_1 = 0, their derivatives of U, with U convex all the way to larger omega_1."""
     while True:
         w1, w3, kappa_n = random.uniform(0.8, 4), random.uniform(-3, 3), random.uniform(-4, 4)
-        d = np.array(finite_width.strain_energy(w1 + np.linspace(0, 6, 61), w3, kappa_n, NU, Gamma))
+        d = derivatives(w1 + np.linspace(0, 6, 61), w3, kappa_n, Gamma)
         if np.all((d[3] > 0) & (d[3] * d[5] - d[4] ** 2 > 0.01 * d[3])):
             return w1, w3, kappa_n, d[:, 0]
 
@@ -89,7 +101,7 @@ def test_the_energy_is_the_least_of_a_plate(Gamma):
         b = NU * bent * curvature @ weight - 2 * stretch * w1 * (value * weight) @ twist
         c = bent**2 / 2 + (1 - NU) * w3**2 + stretch * weight @ twist**2
         least = c - b @ np.linalg.lstsq(A, b, rcond=1e-14)[0] / 2
-        assert finite_width.strain_energy(w1, w3, kappa_n, NU, Gamma)[0] == pytest.approx(least, rel=1e-10)
+        assert derivatives(w1, w3, kappa_n, Gamma)[0] == pytest.approx(least, rel=1e-10)
 
 
 @pytest.mark.parametrize("Gamma", (0.0, 1.0, 30.0))
@@ -108,7 +120,7 @@ def test_derivatives_of_the_energy(Gamma):
     for at in ((1.3, 0.7, 2.0), (0.02, -0.4, 3.0), (-0.5, 0.3, 1.0)):
         with mpmath.workdps(80):
             exact = [float(mpmath.diff(energy, tuple(map(mpmath.mpf, at)), order, h=mpmath.mpf(10) ** -20)) for order in orders]
-        assert finite_width.strain_energy(*at, NU, Gamma) == pytest.approx(exact, rel=1e-12, abs=1e-13)
+        assert derivatives(*at, Gamma) == pytest.approx(exact, rel=1e-12, abs=1e-13)
 
 
 # --- the Legendre transform -------------------------------------------------------------------------------------------
@@ -159,7 +171,7 @@ def test_limits_of_the_response():
 
 def test_where_the_energy_is_not_convex_there_is_no_response():
     """At w^2 kappa_n / h = 100 an arc opened to xi = .85 has t < 0 (its t vanishes first at .776)."""
-    d = finite_width.strain_energy(0.15, 0.0, 1.0, NU, 100.0)
+    d = derivatives(0.15, 0.0, 1.0, 100.0)
     assert d[5] < 0
     values = FINITE_WIDTH.response(d[1], 0.0, 0.0, 1.0, NU, 100.0)
     assert all(map(math.isnan, (values[0], values[1], values[3], values[4])))
@@ -171,33 +183,33 @@ def test_where_the_energy_is_not_convex_there_is_no_response():
 def test_thresholds_from_the_flat_rod_to_the_ribbon():
     for m, n in ((1, 2), (1, 5), (3, 1), (5, 6)):
         flat, ribbon = thresholds(FLAT_ROD, m, n, NU)[0], thresholds(RIBBON, m, n, NU)[0]
-        assert thresholds(FINITE_WIDTH, m, n, NU, 0.0)[0] == pytest.approx(flat, rel=1e-14)
-        assert thresholds(FINITE_WIDTH, m, n, NU, 1e12)[0] == pytest.approx(ribbon, rel=1e-4)
+        assert thresholds(FINITE_WIDTH, m, n, wide(0.0))[0] == pytest.approx(flat, rel=1e-14)
+        assert thresholds(FINITE_WIDTH, m, n, wide(1e12))[0] == pytest.approx(ribbon, rel=1e-4)
     # by shooting with this energy, independently of the formula
-    assert [round(thresholds(FINITE_WIDTH, 1, 2, NU, G)[0], 3) for G in (1e-3, 10, 100)] == [5.615, 3.346, 2.680]
+    assert [round(thresholds(FINITE_WIDTH, 1, 2, wide(G))[0], 3) for G in (1e-3, 10, 100)] == [5.615, 3.346, 2.680]
 
 
 @pytest.mark.full
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})
-    start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
+    start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, wide(10.0))["M1"])
     found = trace(point_of(system, start), Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
-    expected = [thresholds(FINITE_WIDTH, 1, n, NU, 10.0)[0] for n in (2, 3)]
+    expected = [thresholds(FINITE_WIDTH, 1, n, wide(10.0))[0] for n in (2, 3)]
     assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)
-    low, high = stability_interval(FINITE_WIDTH, 1, NU, 10.0)
+    low, high = stability_interval(FINITE_WIDTH, 1, wide(10.0))
     assert high == expected[0]
-    assert [index(FINITE_WIDTH, 1, k, NU, 10.0) for k in (3.3, 3.4, 4.5, 6.0)] == [0, 2, 4, math.inf]
+    assert [index(FINITE_WIDTH, 1, k, wide(10.0)) for k in (3.3, 3.4, 4.5, 6.0)] == [0, 2, 4, math.inf]
 
 
 def test_covering_indices_and_names():
     for m, kappa_n in ((1, 4.0), (3, -0.5), (5, 30.0)):
         for law, Gamma in ((RIBBON, None), (FINITE_WIDTH, 0.0), (FINITE_WIDTH, 7.0)):
-            values = circle(law, m, kappa_n, NU, Gamma)
-            assert covering(kappa_n, values["kappa_star"], values["energy"]) == m
+            values = circle(law, m, kappa_n, wide(Gamma))
+            assert covering(law, wide(Gamma), kappa_n, values["kappa_star"], values["energy"]) == m
             assert from_label(label(law.name, Gamma)) == (law, Gamma)
     for law, Gamma in ((RIBBON, 1.0), (FINITE_WIDTH, None), (FINITE_WIDTH, -1.0)):
         with pytest.raises(ValueError, match="Gamma"):
-            thresholds(law, 1, 2, NU, Gamma)
+            thresholds(law, 1, 2, wide(Gamma))
 
 
 # --- branches ---------------------------------------------------------------------------------------------------------
@@ -207,7 +219,7 @@ def test_covering_indices_and_names():
 @pytest.mark.parametrize(("m", "n", "Gamma"), [(1, 2, 10.0), (1, 2, 100.0), (3, 4, 10.0)])
 def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
     found = branch(m, n, Gamma)
-    points = exact_finite_width.curve(m, n, NU, Gamma)
+    points = exact_finite_width.curve(m, n, wide(Gamma))
     folds = [point for point in points if point.label == "LP"]
     assert len(folds) == 1
     for p, e in zip(found.labelled("LP"), folds, strict=True):
@@ -224,7 +236,7 @@ def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
     found = followed(3, 1, 10.0, events=convexity.test_functions(FINITE_WIDTH))
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
-    lost = exact_finite_width.curve(3, 1, NU, 10.0)[-1]
+    lost = exact_finite_width.curve(3, 1, wide(10.0))[-1]
     assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
     assert not convexity.test_functions(RIBBON)
 
@@ -238,7 +250,7 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
     """
     ends = convexity.test_functions(FINITE_WIDTH)
     for intervals, degree in ((10, 7), (40, 4)):
-        system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, nu, intervals, degree, Gamma=Gamma)
+        system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, {"nu": nu, "Gamma": Gamma}, intervals, degree)
         found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
         assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([fold], abs=1e-6)
 
@@ -248,8 +260,8 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
 def test_the_law_has_the_bending_of_the_single_loop(nu, Gamma):
     """Where U - M.omega has two minima, the circle is the outer one of a wide strip and the inner one of a narrow one."""
     for n in range(2, 11):
-        kappa_n = thresholds(FINITE_WIDTH, 1, n, nu, Gamma)[0]
-        moment = [circle(FINITE_WIDTH, 1, kappa_n, nu, Gamma)["M1"], 0.0, 0.0]
+        kappa_n = thresholds(FINITE_WIDTH, 1, n, {"nu": nu, "Gamma": Gamma})[0]
+        moment = [circle(FINITE_WIDTH, 1, kappa_n, {"nu": nu, "Gamma": Gamma})["M1"], 0.0, 0.0]
         strains, _ = FINITE_WIDTH.linearized(np.array([moment]), kappa_n, nu, Gamma)
         assert strains[0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
 
@@ -263,10 +275,10 @@ def test_the_outer_minimum_of_a_wide_strip_is_followed():
 
 def test_a_circle_at_the_other_minimum_is_refused():
     with pytest.raises(TwoBendings, match=r"m = 2, n = 7: the strain energy of the circle .* has two minima"):
-        primary_branch(FINITE_WIDTH, 2, 7, 0.45, 10, 7, Gamma=6.0)
+        primary_branch(FINITE_WIDTH, 2, 7, {"nu": 0.45, "Gamma": 6.0}, 10, 7)
     with pytest.raises(TwoBendings, match="it holds for smaller n"):
-        half_loop_branch(FINITE_WIDTH, 2, 7, 0.45, 10, 7, Gamma=6.0)
-    primary_branch(FINITE_WIDTH, 2, 5, 0.45, 10, 7, Gamma=6.0)
+        half_loop_branch(FINITE_WIDTH, 2, 7, {"nu": 0.45, "Gamma": 6.0}, 10, 7)
+    primary_branch(FINITE_WIDTH, 2, 5, {"nu": 0.45, "Gamma": 6.0}, 10, 7)
 
 
 def test_a_branch_on_which_the_energy_has_two_minima():
@@ -275,18 +287,18 @@ def test_a_branch_on_which_the_energy_has_two_minima():
 
     Its kappa_n is the closed form; the folds are those of `exact_finite_width.curve`, which takes 40 s.
     """
-    system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, 0.4, 10, 7, Gamma=40.0)
+    system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, {"nu": 0.4, "Gamma": 40.0}, 10, 7)
     ends = convexity.test_functions(FINITE_WIDTH)
     found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([27.387660, -43.957859], abs=1e-6)
     assert found.stop.reason == "trivial branch"
-    assert found.points[-1]["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 9, 5, 0.4, 40.0)[0], abs=1e-9)
+    assert found.points[-1]["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 9, 5, {"nu": 0.4, "Gamma": 40.0})[0], abs=1e-9)
 
 
 @pytest.mark.parametrize(("m", "n", "nu", "Gamma", "end"), [(8, 3, 0.0478, 10.21, -59.05), (9, 5, 0.13, 1.719, 0.893)])
 def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
     """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""
-    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 10, 7, Gamma=Gamma)
+    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 10, 7)
     ends = convexity.test_functions(FINITE_WIDTH)
     found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
@@ -313,7 +325,7 @@ def test_the_fold_of_1_2_is_born_at_the_pitchfork():
     assert 4 < birth["Gamma"] < 5
     assert birth["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 1, 2, NU, birth["Gamma"])[0], abs=1e-9)
     for Gamma, there in ((birth["Gamma"] - 0.05, 0), (birth["Gamma"] + 0.05, 1)):  # independently
-        points = exact_finite_width.curve(1, 2, NU, Gamma)
+        points = exact_finite_width.curve(1, 2, wide(Gamma))
         assert sum(point.label == "LP" for point in points) == there
 
 
@@ -323,16 +335,17 @@ def test_the_fold_of_1_2_is_born_at_the_pitchfork():
 def test_the_unfolding_arc():
     """Two routes agree; a wide strip is the ribbon, a narrow one the flat rod, and in between there is a least width."""
     xi = np.array([0.1, 0.45, 0.7])
-    even, odd = factors(FINITE_WIDTH, NU, xi, width=75.0)
-    t = np.array([finite_width.strain_energy(1 - x, 0.0, 1.0, NU, 75.0)[5] for x in xi])
-    determinant = shooting_determinant(FINITE_WIDTH, NU, xi, width=75.0)
+    even, odd = factors(FINITE_WIDTH, wide(75.0), xi)
+    t = derivatives(1 - xi, 0.0, 1.0, 75.0)[5]
+    determinant = shooting_determinant(FINITE_WIDTH, wide(75.0), xi)
     assert determinant == pytest.approx(-8 * (1 - xi) ** 4 * even * odd / t, rel=1e-10)
-    assert first_root(FINITE_WIDTH, NU, width=1e-6) == pytest.approx(first_root(FLAT_ROD, NU), abs=1e-9)
-    assert first_root(FINITE_WIDTH, NU, width=1e10) == pytest.approx(first_root(RIBBON, NU), abs=1e-4)
-    assert first_root(FINITE_WIDTH, NU, width=100.0) == pytest.approx(
-        first_root(FINITE_WIDTH, NU, width=100.0, method="shooting"), abs=1e-11
+    assert first_root(FINITE_WIDTH, wide(1e-6)) == pytest.approx(first_root(FLAT_ROD, NU), abs=1e-9)
+    assert first_root(FINITE_WIDTH, wide(1e10)) == pytest.approx(first_root(RIBBON, NU), abs=1e-4)
+    assert first_root(FINITE_WIDTH, wide(100.0)) == pytest.approx(
+        first_root(FINITE_WIDTH, wide(100.0), method="shooting"), abs=1e-11
     )
-    assert first_root(FINITE_WIDTH, NU, width=50.0, largest=0.99) is None
+    assert first_root(FINITE_WIDTH, wide(50.0), largest=0.99) is None
     # the smallest widths at which t vanishes somewhere in 0 < xi < 1, from a scan of the formula
     for nu, low, high in ((0.1, 173, 174), (0.2, 81, 82), (0.3, 51, 52), (0.4, 36, 37)):
-        assert finite_width.first_zero_of_t(nu, low) is None and finite_width.first_zero_of_t(nu, high) is not None
+        vanishes = [np.any(FINITE_WIDTH.on_circle(np.geomspace(1e-6, 1, 3000), 1.0, nu, G).twisting < 0) for G in (low, high)]
+        assert vanishes == [False, True]

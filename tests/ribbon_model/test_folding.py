@@ -17,7 +17,7 @@ KAPPA, NU, GAMMA = 3.3, 0.3, 0.1
 def test_the_path_ends_on_the_primary_branch():
     """The first state without couples is the one on (1, 2) at this kappa_n, by the quadrature of that branch."""
     path = folding(FINITE_WIDTH, 1, KAPPA, NU, GAMMA)
-    saddle = curve(1, 2, NU, GAMMA, kappa_limits=(KAPPA, 100.0))[-1]
+    saddle = curve(1, 2, {"nu": NU, "Gamma": GAMMA}, kappa_limits=(KAPPA, 100.0))[-1]
     assert path.energies[-1] == pytest.approx(saddle.energy, abs=1e-9)
     assert path.couples[-1] == pytest.approx(0, abs=1e-9) and path.couples[0] == 0
 
@@ -26,7 +26,7 @@ def test_the_path_ends_on_the_primary_branch():
 @pytest.mark.parametrize(("law", "m", "Gamma"), [(FINITE_WIDTH, 1, GAMMA), (FLAT_ROD, 3, None)])
 def test_the_couple_is_the_slope_of_the_energy(law, m, Gamma):
     """Work: 2 pi dE = C d(angle). The energy at every point against the integral of a spline through the couples."""
-    path = folding(law, m, KAPPA, NU, Gamma)
+    path = folding(law, m, KAPPA, {"nu": NU, "Gamma": Gamma})
     arc = np.concatenate([[0], np.cumsum(np.hypot(np.diff(path.angles), np.diff(path.couples)))])
     angle, couple = CubicSpline(arc, path.angles), CubicSpline(arc, path.couples)
     nodes, weights = np.polynomial.legendre.leggauss(8)

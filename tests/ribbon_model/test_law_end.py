@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 import contin
 from ribbon_model.ends import FREE_END
 from ribbon_model.equilibrium import moment_on_directors
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import Section, section_of
 
 
 def cantilever_end(nu: float, k: float) -> float:
@@ -29,7 +29,7 @@ def cantilever_end(nu: float, k: float) -> float:
     return brentq(length, (1 - k * k) / 2 * (1 + 1e-9), 3, xtol=1e-14)
 
 
-def pulled(material: Material, **options) -> contin.Branch:
+def pulled(material: Section, **options) -> contin.Branch:
     strip = OpenStrip(material, finish=FREE_END, numbers={"force_normal": 0.0})
     settings = {"limits": {"force_normal": (-1, 5)}, "events": strip.domain_tests()}
     return contin.trace(strip.first_point(**options), free=["force_normal"], **settings)
@@ -41,7 +41,7 @@ def pulled(material: Material, **options) -> contin.Branch:
 )  # t = 0 at omega_1 = nu kappa_n; nu < 0: bending to the other side has less energy below omega_1 = -nu kappa_n
 def test_a_ribbon_ends_in_the_plane_where_its_law_does(nu, curvature, intervals):
     """Beyond, omega_1 jumps: there were 34 further points, some with a wrong index, and branch points with an error of nan."""
-    branch = pulled(Material("ribbon", {"nu": nu, "kappa_n": 1.0}), intervals=intervals)
+    branch = pulled(section_of("ribbon", {"nu": nu, "kappa_n": 1.0}), intervals=intervals)
     end = branch.points[-1]
     assert branch.stop.message.startswith("met the end of the law 'ribbon'")
     assert [point.label for point in branch if point.label] == ["EP", "EP"]
@@ -52,7 +52,7 @@ def test_a_ribbon_ends_in_the_plane_where_its_law_does(nu, curvature, intervals)
 
 def test_the_end_between_clamps_is_where_the_least_bending_is_nu_kappa_n():
     """A clamped arc is opened by ``bend``; M1 is read from the polynomial, by a fine sample."""
-    strip = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": 1.0}))
+    strip = OpenStrip(section_of("ribbon", {"nu": 0.3, "kappa_n": 1.0}))
     branch = contin.trace(
         strip.first_point(intervals=4),
         free=["bend"],
@@ -90,6 +90,11 @@ def best(M1, M3, kappa_n, D, side):
     return float(value.max()), float(centre[0])
 
 
+def margin_of(section: Section, t: float, M1: float, M3: float) -> float:
+    numbers = SimpleNamespace(**section.parameters)
+    return section.margin(np.array([t]), np.array([[M1, 0.0, M3]]), np.empty((1, 3)), numbers)[0]
+
+
 def isotropic(nu):
     return 1.0, nu, 1.0, (1 - nu) / 2
 
@@ -101,8 +106,8 @@ def test_a_twisted_ribbon_is_within_its_law_where_the_strain_of_least_energy_is_
     nu, kappa_n = random.uniform(-0.5, 0.5), random.uniform(-2, 2)
     M1, M3 = random.uniform(-3, 3), random.uniform(0.1, 3)
     sides = [best(M1, M3, kappa_n, isotropic(nu), side)[0] for side in (1, -1)]
-    material = Material("ribbon", {"nu": nu, "kappa_n": kappa_n})
-    margin = material.ribbon_margin(0.5, M1, M3, SimpleNamespace(**material.parameters))
+    material = section_of("ribbon", {"nu": nu, "kappa_n": kappa_n})
+    margin = margin_of(material, 0.5, M1, M3)
     assert (margin > 0) == (sides[0] > sides[1])
 
 
@@ -112,10 +117,10 @@ def test_a_twisted_ribbon_is_within_its_law_where_the_strain_of_least_energy_is_
 @pytest.mark.parametrize("kappa_n", [0.8, -0.8])
 def test_a_planar_strip_of_any_plate_ends_where_its_twisting_modulus_or_its_side_does(D, kappa_n):
     """Along M1, the strain of least energy leaves the plane, or omega_1 > 0, where the margin vanishes."""
-    plate = Material("ribbon", {**dict(zip(("D11", "D12", "D22", "D66"), D)), "kappa_n": kappa_n})
+    plate = section_of("ribbon", {**dict(zip(("D11", "D12", "D22", "D66"), D)), "kappa_n": kappa_n})
 
     def margin(M1):
-        return plate.ribbon_margin(0.5, M1, 0.0, SimpleNamespace(**plate.parameters))
+        return margin_of(plate, 0.5, M1, 0.0)
 
     end = brentq(margin, -10, 10)
 
@@ -131,14 +136,13 @@ def test_a_planar_strip_of_any_plate_ends_where_its_twisting_modulus_or_its_side
 
 def test_a_section_with_another_thickness_has_its_own_moment():
     """The margin is that of the moment over w h**3: omega_1 of a planar strip is M1/(w h**3) + kappa_n."""
-    tapered = Material("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
-    numbers = SimpleNamespace(**tapered.parameters)
-    assert tapered.ribbon_margin(1.0, -0.7 * 0.5**3, 0.0, numbers) == pytest.approx(0, abs=1e-14)
+    tapered = section_of("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
+    assert margin_of(tapered, 1.0, -0.7 * 0.5**3, 0.0) == pytest.approx(0, abs=1e-14)
 
 
 def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     """The least margin is inside the strip here, and beyond it omega_1 jumps: no state is found there."""
-    tapered = Material("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
+    tapered = section_of("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
     strip = OpenStrip(tapered, finish=FREE_END, numbers={"force_normal": 0.0})
     system, x = strip.first_point().system.with_free(("force_normal",), strip.first_point().x)
     settings = contin.Settings(limits={"force_normal": (-1, 5)}, events=strip.domain_tests())
@@ -158,19 +162,19 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
 def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
     """A clamped arch turns from one side to the other. The law that the sentence names finds it."""
     ends = {"numbers": {"distance": 0.95}}
-    ribbon = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": kappa_n}), **ends)
+    ribbon = OpenStrip(section_of("ribbon", {"nu": 0.3, "kappa_n": kappa_n}), **ends)
     sentence = "'ribbon' has no value where the bending vanishes .* take the law 'finite width'"
     with pytest.raises(contin.ProblemError, match=sentence):
         ribbon.first_point(ribbon.arch())
     if kappa_n == 0:
         with pytest.raises(contin.ProblemError, match=sentence):
             ribbon.first_point()
-        wide = OpenStrip(Material("finite width", {"nu": 0.3, "Gamma": 10.0}), **ends)
+        wide = OpenStrip(section_of("finite width", {"nu": 0.3, "Gamma": 10.0}), **ends)
         assert wide.first_point(wide.arch())["distance"] == 0.95
 
 
 def test_a_failure_that_is_not_of_the_law_keeps_its_sentence():
     """The natural arc bends to one side; its ends are far from the distance."""
-    ribbon = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": 3.0}), numbers={"distance": 0.99})
+    ribbon = OpenStrip(section_of("ribbon", {"nu": 0.3, "kappa_n": 3.0}), numbers={"distance": 0.99})
     with pytest.raises(contin.ProblemError, match="no equilibrium was found near the first guess"):
         ribbon.first_point()

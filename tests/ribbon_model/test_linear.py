@@ -7,8 +7,8 @@ import pytest
 
 from ribbon_model import exact
 from ribbon_model.dispersion import coefficients, determinant, mode_matrix, squared_frequencies
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON, Law
-from ribbon_model.linear import energy_interval, index, stability_interval, thresholds
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON, Law, NoThreshold
+from ribbon_model.linear import convex_limits, energy_interval, index, stability_interval, thresholds
 
 #: Table 3 of Audoly & Seffen (2015): K for nu = .3, n = 1 ... 7; the 1. of n = m are rigid rotations.
 TABLE_3 = {
@@ -85,11 +85,33 @@ def test_table_2_follows_from_the_laws(law):
         assert math.isinf(g) and omega_2 == 0 if law.constrained else tiny / omega_2 == pytest.approx(g)
 
 
-def test_a_law_outside_table_2_is_refused():
-    other = Law("other", lambda M1, M2, M3, kappa_n, nu: M1, constrained=True)
+def test_a_law_that_couples_bending_and_twisting_is_refused():
+    other = Law(
+        "other", lambda M1, M2, M3, kappa_n, nu: M1 * M1 / 2 + M1 * kappa_n + M3 * M3 / 2 + M1 * M3 / 4, constrained=True
+    )
     for attempt in (lambda: other.tangent_moduli(1.0, 0.3), lambda: index(other, 1, 1.0, 0.3)):
-        with pytest.raises(ValueError, match="'other'"):
+        with pytest.raises(ValueError, match="'other' couples bending and twisting"):
             attempt()
+
+
+@pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=PAPER_LAWS)
+def test_closed_forms_follow_from_the_energy(law):
+    """Circles, moduli, thresholds, limits and intervals of the same law without its closed forms: from U, and from H alone."""
+    by_energy = Law(law.name, law.hamiltonian, law.constrained, energy=law.energy)
+    by_hamiltonian = Law(law.name, law.hamiltonian, law.constrained)
+    for other in (by_energy, by_hamiltonian):
+        for m, kappa_n in ((1, 0.5), (3, -1.0), (3, 2.5)):
+            assert law.on_circle(m, kappa_n, 0.3) == pytest.approx(other.on_circle(m, kappa_n, 0.3), rel=1e-13, abs=1e-14)
+        for m, n, nu in ((1, 2, 0.3), (5, 6, 0.3), (1, 30, 0.45), (5, 6, -0.3), (3, 4, 0.0)):
+            assert thresholds(other, m, n, nu) == pytest.approx(thresholds(law, m, n, nu), rel=1e-13)
+    for m, n, nu in ((3, 1, 0.3), (7, 2, 0.3), (5, 4, -0.2)):  # below kappa_n = m
+        assert thresholds(by_energy, m, n, nu) == pytest.approx(thresholds(law, m, n, nu), rel=1e-13)
+    for m, nu in ((1, 0.3), (3, 0.3), (1, -0.3)):
+        assert convex_limits(by_energy, m, nu) == pytest.approx(convex_limits(law, m, nu), rel=1e-12)
+        assert energy_interval(by_energy, m, nu) == pytest.approx(energy_interval(law, m, nu), rel=1e-12, abs=1e-14)
+    if law is RIBBON:
+        with pytest.raises(NoThreshold, match="nu = -0.3: no threshold"):
+            thresholds(by_energy, 1, 2, -0.3)
 
 
 def test_determinant_factors_with_the_sign_corrected():
@@ -161,7 +183,7 @@ def test_intervals_for_poisson_ratios_about_zero():
     assert stability_interval(RIBBON, 3, 1e-10) == pytest.approx(stability_interval(RIBBON, 3, 0.0))
     assert stability_interval(RIBBON, 1, -0.3) == (pytest.approx(-1 / 0.3), math.inf)
     assert index(RIBBON, 1, -3.3, -0.3) == 0 and index(RIBBON, 1, -3.34, -0.3) == math.inf
-    with pytest.raises(ValueError, match="outside"):
+    with pytest.raises(ValueError, match="must be greater than -1"):
         stability_interval(RIBBON, 1, 1.0)
     with pytest.raises(ValueError, match="whole number"):
         index(RIBBON, 0, 1.0, 0.3)

@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, JOINT, End
 from ribbon_model.laws import LAWS
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 from ribbon_model.unfolding import first_root
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
@@ -39,7 +39,7 @@ def test_an_unfolded_semicircle_leaves_its_plane(law, first):
     At nu = .3: .6959 (ribbon), 1.72 (isotropic rod), 4.05 (flat rod, which is indeterminate where it is straight: from xi = 2).
     """
     strip = OpenStrip(
-        Material(law, {"nu": 0.3, "kappa_n": math.pi}), finish=End(held=(WIDTH,)), numbers={"bend": math.pi * (1 - first)}
+        section_of(law, {"nu": 0.3, "kappa_n": math.pi}), finish=End(held=(WIDTH,)), numbers={"bend": math.pi * (1 - first)}
     )
     size = math.pi * (1 - first)
     arc = strip.first_point(
@@ -95,7 +95,7 @@ def test_a_twisted_rod_between_universal_joints(tension):
     provides them (Ziegler 1977), so no scene can state it.
     """
     joint, C = {"axis": NORMAL, "director": 0}, 0.8
-    rod = Material("rod", {"B1": 1.0, "B2": 1.0, "C": C})
+    rod = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": C})
     strip = OpenStrip(rod, End(JOINT, **joint), End(JOINT, **joint, held=SIDEWAYS), {"turn": 1.0, "force_tangent": tension})
     start = strip.first_point(lambda t: (math.cos(t / 2), 0, 0, math.sin(t / 2), 0, 0, t))
     turns = np.linspace(1, 12, 400)
@@ -155,7 +155,7 @@ def test_the_twist_threshold_of_a_long_strip(nu):
         limit = endless(nu) * math.sqrt(tension * plate)
         expected = twisted(nu, tension, 0.95 * limit, 1.3 * limit)
         strip = OpenStrip(
-            Material("flat rod", {"nu": nu}), CLAMP, End(held=SIDEWAYS), {"turn": 0.95 * limit, "force_tangent": tension}
+            section_of("flat rod", {"nu": nu}), CLAMP, End(held=SIDEWAYS), {"turn": 0.95 * limit, "force_tangent": tension}
         )
         found = first_branch_point(strip.first_point(strip.twisted(0.95 * limit)), "turn", 0.9 * limit, 1.01 * expected)
         assert math.isclose(found["turn"], expected, rel_tol=1e-8)
@@ -225,8 +225,8 @@ def amplitude_law(nu: float, stretch: float, plate: float) -> tuple[float, float
 
 
 MATERIALS = {
-    "flat rod": (Material("flat rod", {"nu": 0.3}), (0.3, 0.0, 1.0)),
-    "finite width": (Material("finite width", {"nu": 0.3, "Gamma": 2.0}), (0.3, 3 * 0.91 * 4 / 180, 0.91)),
+    "flat rod": (section_of("flat rod", {"nu": 0.3}), (0.3, 0.0, 1.0)),
+    "finite width": (section_of("finite width", {"nu": 0.3, "Gamma": 2.0}), (0.3, 3 * 0.91 * 4 / 180, 0.91)),
 }  # fmt: skip
 
 

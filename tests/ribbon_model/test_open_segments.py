@@ -11,11 +11,11 @@ from ribbon_model.barriers import KICK_OPEN, apart, ways_down
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.descent import descend, modes
 from ribbon_model.ends import ANGLES, BALL, CLAMP, FREE_END, PLACE, End, angles_of, hinge
-from ribbon_model.material import Material
 from ribbon_model.open_segments import OpenChain, cut, unsupported
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 
-ROD = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8, "kappa_n": 0.5})
+ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8, "kappa_n": 0.5})
 LOADS = {"force_width": 1.3, "force_normal": -0.4, "force_tangent": 0.7, "weight": 2.0, "foundation": 3.0}
 STRIPS = {
     "clamped": OpenStrip(ROD, numbers={"weight": 2.0}), "free": OpenStrip(ROD, finish=FREE_END, numbers=LOADS),
@@ -64,7 +64,7 @@ def test_derivatives_against_differences(ends):
 )  # fmt: skip
 def test_the_energy_is_that_of_the_hamiltonian(law, numbers):
     """U(w) and the largest M.w - H belong together: dH/dM at M = dU/dw is w, and U = M.w - H."""
-    material = Material(law, numbers, {"width": "1 - s/4"} if law == "finite width" else {})
+    material = section_of(law, numbers, {"width": "1 - s/4"} if law == "finite width" else {})
     p, t = contin_numbers(material), np.array([0.2, 0.7])
     strains = np.array([[0.9, 0.05, 0.3], [1.2, -0.1, -0.4]])
     U, moment, stiffness = material.strain_energy(t, strains, p)
@@ -89,7 +89,7 @@ def contin_numbers(material):
 @pytest.mark.parametrize("finish", ["clamped", "hinged"])
 def test_the_index_and_the_energy_are_those_of_the_continuous_strip(finish):
     """Along the arch whose end is bent: the number of negative eigenvalues, and the energy, whose error falls by four."""
-    rod = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    rod = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
     if finish == "clamped":
         name, strip = "bend", OpenStrip(rod, numbers={"distance": 0.9, "bend": 0.0})
     else:
@@ -111,7 +111,7 @@ def test_the_index_and_the_energy_are_those_of_the_continuous_strip(finish):
 @pytest.mark.full
 def test_both_sides_of_the_saddle_between_two_arches():
     """The second mode of a clamped arch has index 1 and leads to both first modes, mirror images of equal energy."""
-    strip = OpenStrip(Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8}), numbers={"distance": 0.9})
+    strip = OpenStrip(section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8}), numbers={"distance": 0.9})
     arches = [strip.first_point(strip.arch(side=side)) for side in (1.0, -1.0)]
 
     column = OpenStrip(strip.material, finish=End(held=CLAMP.held[:2]), numbers={"force_tangent": -70.0})

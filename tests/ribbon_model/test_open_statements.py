@@ -9,14 +9,14 @@ import pytest
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, End, hinge
 from ribbon_model.loads import LOADS
-from ribbon_model.material import Material
 from ribbon_model.open_strip import UNDETERMINED, OpenStrip
+from ribbon_model.section import section_of
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
-ROD = Material("rod", {"B1": 1.0, "B2": 3.0, "C": 0.8, "kappa_n": 0.7})
+ROD = section_of("rod", {"B1": 1.0, "B2": 3.0, "C": 0.8, "kappa_n": 0.7})
 MATERIALS = (
-    ROD, Material("flat rod", {"nu": 0.3}), Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8}),
-    Material("flat rod", {"nu": 0.3, "kappa_n": 0.9}),
+    ROD, section_of("flat rod", {"nu": 0.3}), section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8}),
+    section_of("flat rod", {"nu": 0.3, "kappa_n": 0.9}),
 )  # fmt: skip
 ROTATIONS = (
     ("clamped", WIDTH, 0), ("hinged", WIDTH, 0), ("hinged", TANGENT, 0), ("hinged", NORMAL, 0), ("joint", NORMAL, 0),
@@ -118,12 +118,12 @@ def test_what_nothing_determines_is_rejected(what):
 @pytest.mark.parametrize(
     "make, sentence",
     [
-        (lambda: Material("ribon", {}), "law: 'ribon' must be one of"),
-        (lambda: Material("ribbon", {}), "nu: is missing"),
-        (lambda: Material("ribbon", {"nu": 0.3, "tau_n": 1.0}), "tau_n: is not a number of the law 'ribbon'"),
-        (lambda: Material("flat rod", {"nu": 2.0}), "nu: 2 must be"),
-        (lambda: Material("flat rod", {"nu": 0.3}, {"kappa_n": "s.real"}), "is not allowed"),
-        (lambda: Material("flat rod", {"nu": 0.3}, {"kappa_n": "__import__('os')"}), "is not allowed"),
+        (lambda: section_of("ribon", {}), "law: 'ribon' must be one of"),
+        (lambda: section_of("ribbon", {}), "nu: is missing"),
+        (lambda: section_of("ribbon", {"nu": 0.3, "tau_n": 1.0}), "tau_n: is not a number of the law 'ribbon'"),
+        (lambda: section_of("flat rod", {"nu": 2.0}), "nu: 2 must be"),
+        (lambda: section_of("flat rod", {"nu": 0.3}, {"kappa_n": "s.real"}), "is not allowed"),
+        (lambda: section_of("flat rod", {"nu": 0.3}, {"kappa_n": "__import__('os')"}), "is not allowed"),
         (lambda: End(held=(WIDTH, WIDTH)), "repeat each other"),
         (lambda: End(held=((0, 0, 0),)), "must be three numbers"),
         (lambda: End("glued"), "rotation: 'glued' must be"),

@@ -11,12 +11,12 @@ import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, angles_of, hinge
 from ribbon_model.equilibrium import directors
 from ribbon_model.laws import LAWS
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 SIDEWAYS = (WIDTH, NORMAL)
-ROD = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
 #: The first zero of tan x = x.
 ZERO = brentq(lambda x: math.sin(x) - x * math.cos(x), 4, 4.7, xtol=1e-15)
 #: Ends of columns under a dead load along the tangent, and their first critical loads (Euler; Love, sect. 264).
@@ -74,7 +74,7 @@ def test_the_elastica_beyond_buckling():
 @pytest.mark.full
 def test_greenhill():
     """Twisted and clamped, the end slides: M L/2B = 4.4934..., two modes at once (Greenhill 1883; Love, sect. 272)."""
-    rod = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
+    rod = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
     twisted = OpenStrip(rod, CLAMP, End(held=SIDEWAYS), {"turn": 10.0, "force_tangent": 0.0})
     branch = follow(twisted.first_point(lambda t: (math.cos(5 * t), 0, 0, math.sin(5 * t), 0, 0, t)), "turn", 10, 12)
     assert_bifurcations(branch, "turn", [2 * ZERO / 0.8], change=2)
@@ -84,7 +84,7 @@ def test_greenhill():
 @pytest.mark.full
 def test_a_twisted_column_under_thrust():
     """Clamped and twisted, M = C turn: u'''' - i M u''' - T u'' = 0, u = u' = 0 at the ends (Love, sect. 272)."""
-    rod, moment = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8}), 0.8
+    rod, moment = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8}), 0.8
 
     def determinant(tension):
         root = np.emath.sqrt(moment**2 / 4 - tension)
@@ -101,16 +101,16 @@ def test_a_twisted_column_under_thrust():
 @pytest.mark.full
 def test_michell_and_zajac():
     """A ring of a straight isotropic rod buckles at a twist of 2 pi sqrt(3) B/C (Michell 1889, Zajac 1962)."""
-    rod = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
+    rod = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
     ring = OpenStrip(rod, numbers={"distance": 0.0, "turn": 13.0}, phases=("spin",))
     start = ring.first_point(ring.twisted_circle(13 / math.pi))
     assert_bifurcations(follow(start, "turn", 12, 14.5), "turn", [2 * math.pi * math.sqrt(3) / 0.8], change=2)
 
 
 LATERAL = {
-    "flat rod": (Material("flat rod", {"nu": 0.3}), 1.0, 2 / 1.3),
-    "finite width": (Material("finite width", {"nu": 0.3, "Gamma": 1.0}), 1 - 0.09, 1.4),
-    "rod": (Material("rod", {"B1": 1.0, "B2": math.inf, "C": 0.7}), 1.0, 0.7),
+    "flat rod": (section_of("flat rod", {"nu": 0.3}), 1.0, 2 / 1.3),
+    "finite width": (section_of("finite width", {"nu": 0.3, "Gamma": 1.0}), 1 - 0.09, 1.4),
+    "rod": (section_of("rod", {"B1": 1.0, "B2": math.inf, "C": 0.7}), 1.0, 0.7),
 }  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def own_weight() -> float:
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_a_strip_buckles_under_its_weight(nu):
     """18.178/sqrt(1 + nu), the same for the flat rod and for finite width (Audoly & Neukirch 2021, sect. 3)."""
-    strip = OpenStrip(Material("flat rod", {"nu": nu}), finish=FREE_END, numbers={"weight": 0.0}, weight_direction=(-1, 0, 0))
+    strip = OpenStrip(section_of("flat rod", {"nu": nu}), finish=FREE_END, numbers={"weight": 0.0}, weight_direction=(-1, 0, 0))
     critical = own_weight() * math.sqrt(2 / (1 + nu))
     assert math.isclose(critical, 18.178 / math.sqrt(1 + nu), rel_tol=5e-6)
     assert_bifurcations(follow(strip.first_point(), "weight", -1, 25), "weight", [critical])
@@ -146,7 +146,7 @@ def test_a_strip_buckles_under_its_weight(nu):
 @pytest.mark.full
 def test_a_strip_of_finite_width_buckles_under_its_weight():
     """The same weight, where B is the plate's: 1 - nu**2 times the value with that of the beam."""
-    material = Material("finite width", {"nu": 0.3, "Gamma": 0.5})
+    material = section_of("finite width", {"nu": 0.3, "Gamma": 0.5})
     strip = OpenStrip(material, finish=FREE_END, numbers={"weight": 0.0}, weight_direction=(-1, 0, 0))
     critical = own_weight() * math.sqrt((1 - 0.3**2) * 2 * (1 - 0.3))
     assert math.isclose(critical, (1 - 0.3**2) * 18.178 / math.sqrt(1.3), rel_tol=5e-6)
@@ -180,7 +180,7 @@ def test_a_helix_under_a_wrench(law):
     place = axis * axis[2] * (1 - s) + d3 * s + np.cross(axis, d3) * c
     turn, bend, swing = angles_of(q)
     prescribed = dict(zip(("shear", "rise", "distance"), place)) | {"turn": turn, "bend": bend, "swing": swing}
-    strip = OpenStrip(Material(law, {**numbers, "kappa_n": kappa_n}), numbers=prescribed)
+    strip = OpenStrip(section_of(law, {**numbers, "kappa_n": kappa_n}), numbers=prescribed)
 
     def guess(t):
         a, b = math.sin(size * t) / size, (1 - math.cos(size * t)) / size

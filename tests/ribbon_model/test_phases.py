@@ -13,11 +13,11 @@ from scipy.optimize import fsolve
 import contin
 from contin import ProblemError
 from ribbon_model.ends import FREE_END
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 
-CUT = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8, "kappa_n": 2 * math.pi})
-STRAIGHT = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
+CUT = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8, "kappa_n": 2 * math.pi})
+STRAIGHT = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
 
 
 @functools.cache
@@ -83,7 +83,7 @@ def test_branch_points_that_a_phase_makes():
 @pytest.mark.parametrize(("stiffness", "turn"), [(1.0, 14.5), (3.0, math.pi)], ids=["a ring that spins", "a band that shifts"])
 def test_the_phases_that_a_message_recommends_are_no_loads(stiffness, turn):
     """All of them lead to states of one energy, on which none has a multiplier; nor on the branch of such states."""
-    material, numbers = Material("rod", {"B1": 1.0, "B2": stiffness, "C": 0.8}), {"distance": 0.0, "turn": turn}
+    material, numbers = section_of("rod", {"B1": 1.0, "B2": stiffness, "C": 0.8}), {"distance": 0.0, "turn": turn}
     strip, energies = OpenStrip(material, numbers=numbers), []
     with pytest.raises(ProblemError) as error:
         strip.first_point(strip.twisted_circle(turn / math.pi))

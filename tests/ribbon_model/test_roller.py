@@ -9,12 +9,12 @@ from scipy.optimize import brentq
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, hinge
 from ribbon_model.integral_conditions import Roller
-from ribbon_model.material import Material
 from ribbon_model.open_strip import OpenStrip
+from ribbon_model.section import section_of
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 #: Stiff against bending in its plane, so that the columns buckle along the normal first.
-ROD = Material("rod", {"B1": 1.0, "B2": 40.0, "C": 30.0})
+ROD = section_of("rod", {"B1": 1.0, "B2": 40.0, "C": 30.0})
 SLIDES = (WIDTH, NORMAL)
 MESH = {"intervals": 20, "mesh": contin.MeshControl(every=0)}
 
@@ -82,7 +82,7 @@ def test_a_roller_elsewhere(at):
 @pytest.mark.full
 def test_an_arch_that_is_pressed_at_the_middle():
     """dE/d(place) is the force of the roller; all forces on the strip sum to zero; the strip is where the roller holds it."""
-    rod = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    rod = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
     strip = OpenStrip(rod, numbers={"distance": 0.9}, roller=Roller(0.5, NORMAL))
     guess = strip.arch()
     point = strip.first_point(guess, {"roller": guess(0.5)[5]}, **MESH)

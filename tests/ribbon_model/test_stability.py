@@ -137,9 +137,10 @@ def test_thresholds_of_circles_are_zeros():
     """Where (25b) of the paper has b = 0 the index of the circle changes, in the class of the wavenumber, to 1e-10."""
     cases = [(law, m, n, None) for law in PAPER_LAWS.values() for m in (1, 3, 5) for n in range(1, 9) if n != m]
     for law, m, n, Gamma in [*cases, (FINITE_WIDTH, 3, 2, 3.0), (FINITE_WIDTH, 3, 4, 3.0), (FINITE_WIDTH, 1, 2, 1.0)]:
-        for threshold in linear.thresholds(law, m, n, NU, Gamma):
+        numbers = {"nu": NU, "Gamma": Gamma}
+        for threshold in linear.thresholds(law, m, n, numbers):
             size = 1e-10 * (1 + abs(threshold))
-            below, above = (index(circle(law, NU, m, threshold + side * size, Gamma)) for side in (-1, 1))
+            below, above = (index(circle(law, numbers, m, threshold + side * size)) for side in (-1, 1))
             changed = {entry.name for entry in below.classes if entry.negative != above[entry.name].negative}
             j = min(n % m, -n % m)
             assert changed == ({(j, "")} if 2 * j % m else {(j, "even"), (j, "odd")}), (law.name, m, n)
@@ -299,7 +300,7 @@ def test_the_form_is_the_second_derivative_of_the_energy():
         turned = slope(directors)
         w1, w2, w3 = (np.sum(turned[:, i] * directors[:, j], axis=1) for i, j in ((1, 2), (2, 0), (0, 1)))
         eta = w3 / w1
-        density = (w1**2 * (1 + eta**2) ** 2 - 2 * at.kappa_n * w1 * (1 + at.nu * eta**2)) / 2
+        density = (w1**2 * (1 + eta**2) ** 2 - 2 * at.kappa_n * w1 * (1 + at.parameters["nu"] * eta**2)) / 2
         return np.mean(density + moment[:, 1] * w2 - directors[:, 2] @ at.force) * LENGTH
 
     random = np.random.default_rng(3)

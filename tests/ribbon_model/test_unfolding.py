@@ -115,7 +115,7 @@ def test_what_is_refused():
         (lambda: shooting_determinant(FLAT_ROD, 0.3, 1.0), "flat strip"),
         (lambda: shooting_determinant(RIBBON, 0.25, 0.75), "twisting modulus vanishes"),
         (lambda: factors(RIBBON, 0.3, 0.0), "natural state"),
-        (lambda: first_root(RIBBON, 1.5), "outside"),
+        (lambda: first_root(RIBBON, 1.5), "must be greater than -1 and at most 0.5"),
         (lambda: first_root(RIBBON, 0.3, method="magic"), "closed form"),
         (lambda: first_root(RIBBON, 0.3, ends=HINGED), "shooting"),
         (lambda: first_root(ISOTROPIC_ROD, 0.0, ends=HINGED, method="shooting"), "mechanism"),
