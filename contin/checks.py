@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import collections.abc
+import functools
 import math
+import os
 import sys
+import types
+import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
@@ -13,6 +19,8 @@ from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.names import exact_text
 
+_Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
 #: Characters of a value that a message shows: with the rest of the sentence it fits on one line.
 _SHOWN = 60
 
@@ -126,3 +134,110 @@ def array(what: str, value: Any, shape: tuple[int, ...]) -> Array:
     if found.shape != shape or not np.isfinite(found).all():
         raise ProblemError(f"{what}: {shown(value)} must be {' x '.join(map(str, shape))} finite numbers")
     return found
+
+
+# --- the arguments of a public function ---------------------------------------------------------------------------------------
+
+
+def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Return a public function that compares its arguments with its annotations before it runs.
+
+    A wrong one is a `ProblemError` that names it. What annotations do not say, the function itself checks.
+
+    Examples
+    --------
+    >>> @arguments
+    ... def half(number: float, times: int = 1) -> float:
+    ...     return number / 2**times
+    >>> half("three")
+    Traceback (most recent call last):
+    contin.errors.ProblemError: number: 'three' must be a number
+    """
+
+    @functools.wraps(function)
+    def checked(*given: _Given.args, **named: _Given.kwargs) -> _Result:
+        hints, names = _annotations(function)
+        for name, value in (*zip(names, given), *named.items()):
+            if said := _refusal(name, value, hints.get(name, Any)):
+                raise ProblemError(said)
+        return function(*given, **named)
+
+    return checked
+
+
+def fields(record: Any) -> None:
+    """Require that the fields of a dataclass are what their annotations say."""
+    hints, _ = _annotations(cast(Any, type(record)))
+    for name, kind in hints.items():
+        if said := _refusal(name, getattr(record, name), kind):
+            raise ProblemError(said)
+
+
+@functools.cache
+def _annotations(annotated: Any) -> tuple[dict[str, Any], Sequence[str]]:
+    """Return the types of the arguments of a function, and the names of those given by place; of a class those of fields."""
+    code = getattr(annotated, "__code__", None)
+    return typing.get_type_hints(annotated), code.co_varnames[: code.co_argcount] if code else ()
+
+
+#: What a value of a plain type is called, and whether a value is one.
+_PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    float: ("a number", is_number),
+    int: ("a whole number", lambda value: isinstance(value, (int, np.integer)) and not isinstance(value, bool)),
+    bool: ("True or False", lambda value: isinstance(value, (bool, np.bool_))),
+    str: ("a name", lambda value: isinstance(value, str)),
+    Path: ("a path", lambda value: isinstance(value, os.PathLike)),
+    Any: ("anything", lambda value: True),
+    object: ("anything", lambda value: True),
+}
+
+
+def _refusal(what: str, value: Any, kind: Any) -> str:
+    """Return why a value may not stand where an annotation is, "" if it may; an array is a list."""
+    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    wrong = f"{what}: {shown(value)} must be {_words(kind)}"
+    if kind in _PLAIN:
+        return "" if _PLAIN[kind][1](value) else wrong
+    if outer in (typing.Union, types.UnionType):
+        said = [_refusal(what, value, each) for each in inner if each is not type(None)]
+        fits = "" in said or (value is None and type(None) in inner)
+        return "" if fits else said[0] if len(said) == 1 else wrong
+    if outer is collections.abc.Callable:
+        return "" if callable(value) else wrong
+    if outer is collections.abc.Mapping:
+        if not isinstance(value, Mapping) or any(_refusal("", name, inner[0]) for name in value):
+            return wrong
+        return next(filter(None, (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items())), "")
+    if outer in (collections.abc.Sequence, tuple, np.ndarray):
+        array = isinstance(value, np.ndarray) and (value.ndim == 1 or outer is np.ndarray)
+        listed = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        fixed = outer is tuple and inner[-1] is not ...
+        if not (array or listed) or (fixed and len(value) != len(inner)):
+            return wrong
+        kinds = () if outer is np.ndarray else inner if fixed else [inner[0]] * len(value)
+        return next(filter(None, (_refusal(what, each, of) for each, of in zip(value, kinds))), "")
+    return "" if isinstance(value, outer or kind) else wrong
+
+
+def _words(kind: Any) -> str:
+    """Return what may stand where an annotation is."""
+    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    if kind in _PLAIN:
+        return _PLAIN[kind][0]
+    if outer in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_words(each) for each in inner if each is not type(None)))
+    if outer is collections.abc.Callable:
+        return "a function"
+    if outer is collections.abc.Mapping:
+        return f"a dict from {_several(inner[0])} to {_several(inner[1])}"
+    if outer is np.ndarray:
+        return "an array"
+    if outer in (collections.abc.Sequence, tuple):
+        count = f"{len(inner)} " * (outer is tuple and inner[-1] is not ...)
+        return "a list" if inner[0] is Any else f"a list of {count}{_several(inner[0])}"
+    name = (outer or kind).__name__
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _several(kind: Any) -> str:
+    return f"{_words(kind).partition(' ')[2]}s"

@@ -96,6 +96,7 @@ class VariationalProblem(BoundaryValueProblem):
     canonical: Canonical
     symmetries: Mapping[str, Symmetry]
 
+    @checks.arguments
     def __init__(
         self, energy: Function | None, states: Sequence[str], parameters: Mapping[str, float], *,
         kinematics: Function | None = None, controls: Sequence[str] | None = None, ends: Function | None = None,
@@ -105,7 +106,7 @@ class VariationalProblem(BoundaryValueProblem):
         starts: Mapping[str, float] | None = None, phases: Sequence[str] = (),
     ) -> None:  # fmt: skip
         integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
-        names = check_statement(states, parameters, checks.mapping("functionals", functionals, "functions"))
+        names = check_statement(states, parameters, functionals)
         if hamiltonian is not None and (energy is not None or kinematics is not None or integrals):
             raise ProblemError("hamiltonian: stands instead of energy, kinematics and integrals, not beside them")
         if hamiltonian is None and energy is None:
@@ -116,17 +117,15 @@ class VariationalProblem(BoundaryValueProblem):
             )
         control_names = names if controls is None else check_statement(controls, {}, {})
         _check_names(parameters, integrals, functionals)
-        for name, value in checks.mapping("starts", starts, "numbers").items():
+        for name, value in starts.items():
             if name not in control_names or hamiltonian is not None:
                 raise ProblemError(f"starts: {checks.shown(name)} is not one of the controls of an energy")
             checks.number(f"starts: {name}", value)
         held = checks.chosen("phases", phases, names if hamiltonian is not None else tuple(integrals))
-        for name, image in checks.mapping("symmetries", symmetries or {}, "functions").items():
-            checks.function(f"symmetries: {name}", image)
         taken = [("energy", energy, 4), ("kinematics", kinematics, 4), ("ends", ends, 3), ("end_energy", end_energy, 3)]
         taken += [("hamiltonian", hamiltonian, 4), *((f"integrals: {name}", g, 4) for name, g in integrals.items())]
         for what, function, count in [*taken, *((f"functionals: {name}", f, 4) for name, f in functionals.items())]:
-            if function is not None and argument_count(checks.function(what, function)) != count:
+            if function is not None and argument_count(function) != count:
                 raise ProblemError(f"{what} must take {count} arguments")
         variation = Variation(
             energy, kinematics, ends, end_energy, hamiltonian, dict(integrals), dict(functionals), names, control_names,
@@ -205,7 +204,7 @@ def _check_names(
     parameters: Mapping[str, float], integrals: Mapping[str, Function], functionals: Mapping[str, Function]
 ) -> None:
     """Raise ProblemError for names of integrals that cannot be used, and for a parameter that has the name of a column."""
-    for name in checks.mapping("integrals", integrals, "functions"):
+    for name in integrals:
         if not name.isidentifier():
             raise ProblemError(f"integrals: {checks.shown(name)} is not usable as a name (a Python identifier)")
         if f"mu_{name}" in functionals:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
-from contin.arrays import Array, Indices
+from contin.arrays import Array, ComplexArray, Indices
 from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
@@ -20,11 +20,23 @@ from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 
 #: What is computed when it is first asked for, and depends on the reference.
-_OF_A_REFERENCE = ("_known_subspaces", "_complements")
+_OF_A_REFERENCE = ("_known", "_complements")
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
-#: Number of places whose subspaces are kept: a step asks for those of a few iterates.
-_KEPT = 8
+#: Number of results at points that are kept, subspaces and eigenvalues: a step asks for those of a few iterates.
+_KEPT = 24
+_Result = TypeVar("_Result")
+
+
+class SaddleSpectrum(NamedTuple):
+    """Eigenvalues at the first equilibrium, the largest real part first, and their eigenvectors as columns."""
+
+    values: ComplexArray
+    right: ComplexArray
+
+    def pair(self, at: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return the right and the left eigenvector of an eigenvalue."""
+        return self.right[:, at], np.asarray(np.linalg.inv(self.right)[at], dtype=complex)
 
 
 class ConnectionEquations(Conditioned):
@@ -64,6 +76,7 @@ class ConnectionEquations(Conditioned):
         self.reference: Array = np.empty(0)
 
     def _take_mesh(self, mesh: Array) -> None:
+        vars(self).pop("_known", None)
         super()._take_mesh(mesh)
         self.equations = self._conditions + self._further
 
@@ -148,15 +161,20 @@ class ConnectionEquations(Conditioned):
 
     def _subspaces(self, p: Array) -> list[tuple[Array, Array, Callable[[Array], Array]]]:
         """Return Q and L of both ends, and what solves X A P - L A Q^T X = -right for X, once for values of all parameters."""
-        key = p.tobytes()
-        if key not in self._known_subspaces:
-            if len(self._known_subspaces) > _KEPT:
-                self._known_subspaces.clear()
-            self._known_subspaces[key] = [self._subspace(p, end) for end in (0, 1)]
-        return self._known_subspaces[key]
+        return self._once("subspaces", p, lambda: [self._subspace(p, end) for end in (0, 1)])
+
+    def _once(self, what: str, at: Array, make: Callable[[], _Result]) -> _Result:
+        """Return what is made of a vector, made once for the last few of them."""
+        key = what, at.tobytes()
+        if key not in self._known:
+            if len(self._known) > _KEPT:
+                self._known.clear()
+            self._known[key] = make()
+        found: _Result = self._known[key]
+        return found
 
     @functools.cached_property
-    def _known_subspaces(self) -> dict[bytes, list[tuple[Array, Array, Callable[[Array], Array]]]]:
+    def _known(self) -> dict[tuple[str, bytes], Any]:
         return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
@@ -305,6 +323,28 @@ class ConnectionEquations(Conditioned):
         p = self.all_parameters(x)
         return self._jacobian_at(self._places(p[None])[0][0], p)
 
+    def saddle(self, x: Array) -> SaddleSpectrum:
+        """Return eigenvalues and eigenvectors at the first equilibrium."""
+        return self._once("saddle", self.all_parameters(x), lambda: _spectrum(self.saddle_jacobian(x)))
+
+    def left_null_vector(self, x: Array) -> Array:
+        """Return w with w F_z = 0, of unit length, z all unknowns but the user's parameters, with the sign of the reference."""
+        return self._once("left", x, lambda: self._left_null_vector(x))
+
+    def _left_null_vector(self, x: Array) -> Array:
+        if x is self.reference:
+            border = np.random.default_rng(11).standard_normal(self.equations)
+        else:
+            border = self.left_null_vector(self.reference)
+        own = [name for name in self.free if name not in self.problem.multipliers]
+        held = np.zeros((len(own), self.size + 1))
+        held[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
+        _, factors = self.linearize(x, held, border[None])
+        unit = np.zeros(self.size + 1)
+        unit[-1] = 1.0
+        w: Array = factors.solve_transposed(unit)[: self.equations]
+        return w / np.linalg.norm(w)
+
     def slow_motion(self, x: Array) -> tuple[Array, float]:
         """Return p and a of a saddle-node: its slow motion is c' = a c^2, with c = p.(u - e) and p.q = 1, |q| = 1.
 
@@ -408,6 +448,12 @@ class ConnectionEquations(Conditioned):
             return None
         renewed = self.with_reference(x)
         return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
+
+
+def _spectrum(jacobian: Array) -> SaddleSpectrum:
+    values, vectors = np.linalg.eig(jacobian)
+    order = np.argsort(-values.real)
+    return SaddleSpectrum(values[order].astype(complex), vectors[:, order].astype(complex))
 
 
 def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:

@@ -24,7 +24,6 @@ at the reference of the discretization.
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -123,7 +122,7 @@ def _second_zero(side: int) -> Event:
 
     def total(trial: Trial) -> float:
         system = _system(trial)
-        rates = -np.sort(-np.linalg.eigvals(system.saddle_jacobian(trial.x)).real)
+        rates = system.saddle(trial.x).values.real
         first = system.problem.unstable - side
         return float(rates[first] + rates[first + 1]) * (1 if side else -1)
 
@@ -160,7 +159,7 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     if point.label not in ("NSS", "NCH", "BT") or not point.is_located:
         return None
     if _system(point.trial).problem.saddle_node:
-        values = np.linalg.eigvals(_system(point.trial).saddle_jacobian(point.trial.x))
+        values = _system(point.trial).saddle(point.trial.x).values
         critical = np.count_nonzero(np.abs(values.real) < _ON_AXIS * np.abs(values).max())
         return ("ZH", "zero-Hopf: the saddle-node has a pair, too") if point.label == "BT" and critical > 2 else None
     kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
@@ -176,33 +175,18 @@ def _system(trial: Trial) -> ConnectionEquations:
     return found
 
 
-@functools.lru_cache(maxsize=4)
-def _reference(system: ConnectionEquations) -> Trial:
-    """Return the reference of a discretization as a point."""
-    return Trial.without_tangent(system, system.reference)
-
-
 def _leading(trial: Trial, side: int) -> ComplexArray:
     """Return the eigenvalues of one side, 0 stable or 1 unstable, the leading one first."""
-    return _eigenvalues(trial, side)[0]
-
-
-@functools.lru_cache(maxsize=8)
-def _eigenvalues(trial: Trial, side: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Return the eigenvalues of one side, the leading one first, and its right and left eigenvector."""
     system = _system(trial)
-    values, vectors = np.linalg.eig(system.saddle_jacobian(trial.x))
-    order = np.argsort(-values.real)
-    count = system.problem.unstable
-    chosen = order[:count][::-1] if side else order[count:]
-    left = np.linalg.inv(vectors)[chosen[0]]
-    return values[chosen].astype(complex), vectors[:, chosen[0]].astype(complex), left.astype(complex)
+    values, count = system.saddle(trial.x).values, system.problem.unstable
+    return values[:count][::-1] if side else values[count:]
 
 
 def _leading_vectors(trial: Trial, side: int) -> tuple[Array, Array]:
     """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
-    _, *there = _eigenvalues(_reference(_system(trial)), side)
-    _, *here = _eigenvalues(trial, side)
+    system = _system(trial)
+    at = system.problem.unstable - side
+    here, there = system.saddle(trial.x).pair(at), system.saddle(system.reference).pair(at)
     signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
     right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
     return right, left
@@ -280,34 +264,11 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
 
     def component(trial: Trial) -> float:
         system, x = _system(trial), trial.x
-        if not known and not np.linalg.norm(system.adjoint_at_ends(x, _border(system))[side]) > _NOTHING:
-            return float("nan")
-        adjoint, unit = system.adjoint_at_ends(x, _adjoint(trial))[side], _leading_vectors(trial, side)[0]
+        if not known:
+            there = system.left_null_vector(system.reference)
+            if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > _NOTHING:
+                return float("nan")
+        adjoint, unit = system.adjoint_at_ends(x, system.left_null_vector(x))[side], _leading_vectors(trial, side)[0]
         return float(unit @ adjoint) if known else _component(unit, adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
-
-
-@functools.lru_cache(maxsize=4)
-def _border(system: ConnectionEquations) -> Array:
-    """Return the left null vector at the reference."""
-    return _left_null_vector(system, system.reference, np.random.default_rng(11).standard_normal(system.equations))
-
-
-@functools.lru_cache(maxsize=4)
-def _adjoint(trial: Trial) -> Array:
-    """Return the left null vector at a point, with the sign of that at the reference."""
-    system = _system(trial)
-    return _left_null_vector(system, trial.x, _border(system))
-
-
-def _left_null_vector(system: ConnectionEquations, x: Array, border: Array) -> Array:
-    """Return w with w F_z = 0, of unit length, and its product with the border positive."""
-    own = [name for name in system.free if name not in system.problem.multipliers]
-    held = np.zeros((len(own), system.size + 1))
-    held[range(len(own)), [system.parameter_index(name) for name in own]] = 1.0
-    _, factors = system.linearize(x, held, border[None])
-    unit = np.zeros(system.size + 1)
-    unit[-1] = 1.0
-    w: Array = factors.solve_transposed(unit)[: system.equations]
-    return w / np.linalg.norm(w)

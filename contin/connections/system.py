@@ -48,7 +48,7 @@ class ConnectionCollocation(ConnectionEquations):
     def defining(self, point: Any, x: Array) -> tuple[EventCurve, Array] | None:
         """Return that of special homoclinic orbits."""
         test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
-        return None if test is None else (EventCurve(self, test.function, label=test.label), x)
+        return None if test is None else (EventCurve(self, test), x)
 
     def events_on_curves(self) -> list[Event]:
         """Return those of homoclinic orbits that are special in another way, too."""

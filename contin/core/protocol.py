@@ -234,7 +234,7 @@ class Discretization(Equations, Protocol):
 
     def degenerate(self, x: Array) -> str:
         """Return why Newton's method may have failed at a guess x, as a sentence; "" where nothing is known."""
-        return ""
+        return self.undetermined(x)
 
     def undetermined(self, x: Array) -> str:
         """Return why a solution x comes with others around it, of which round-off chose one, as a sentence; "" if not."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array
 from contin.core.protocol import Discretization, inner
 from contin.linalg.factors import Factors
@@ -221,6 +222,9 @@ class Event:
     value: float | None = None
     normal_form: Callable[..., Array] | None = None
     still: float = 0.0
+
+    def __post_init__(self) -> None:
+        checks.fields(self)
 
     def holds_one_of(self, free: Sequence[str]) -> bool:
         """Return whether it vanishes where a free parameter has a value."""

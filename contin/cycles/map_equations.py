@@ -265,21 +265,16 @@ class MapEquations(AlgebraicEquations):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
-    def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers, shape (n,): those with a positive real part are unstable.
+    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
+        """Return the logarithms of the multipliers at places: those with a positive real part are unstable.
 
-        That of a pair on the unit circle, to round-off, has the real part zero.
+        That of a pair on the unit circle, to round-off, has the real part zero; the second of each two is as computed.
         """
-        return self._eigenvalues(x)[0]
-
-    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
-        """Return the logarithms of the multipliers at several places."""
-        return [self.eigenvalues(x) for x in places]
-
-    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Return the logarithms, and as computed."""
-        values = self._logarithms(x)
-        return np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values), values
+        found = [(x, self._logarithms(x)) for x in places]
+        return [
+            (np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values), values)
+            for x, values in found
+        ]
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""

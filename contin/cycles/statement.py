@@ -119,7 +119,7 @@ class CycleProblem(BoundaryValueProblem):
         functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
         angles: Angles = (),
     ) -> None:  # fmt: skip
-        means = dict(checks.mapping("functionals", functionals or {}, "functions"))
+        means = dict(checks.mapping("functionals", {} if functionals is None else functionals, "functions"))
         names = check_statement(states, parameters, means)
         forced = period is not None
         periods = angle_periods(angles, names)

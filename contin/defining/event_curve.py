@@ -44,27 +44,24 @@ class EventCurve(Defining):
     ----------
     base : System or Defining
         With one free parameter more than its curves need.
-    function : callable
-        ``function(trial)``, as in `Event`.
+    event : Event
+        Whose function keeps the value zero. Where its ``confirm`` says that a zero is none, the curve ends.
     gradient : callable, optional
         ``gradient(system, x)`` returns the derivatives by x, shape (size,).
-    label : str
-        That of the function.
     """
 
     def __init__(
         self,
         base: Any,
-        function: Callable[[Trial], float],
+        event: Event,
         gradient: Callable[[Any, Array], Array] | None = None,
-        label: str = "",
     ) -> None:
         super().__init__(base)
-        self.function, self._gradient, self.label = function, gradient, label
+        self.event, self._gradient = event, gradient
 
     def on(self, base: System) -> EventCurve:
         """Return the defining system of another underlying one."""
-        return EventCurve(base, self.function, self._gradient, self.label)
+        return EventCurve(base, self.event, self._gradient)
 
     def computed(self, x: Array) -> _Solutions:
         """Return the solutions of F = 0 around x; rows Phi are those that are kept, as long as they fit."""
@@ -84,7 +81,11 @@ class EventCurve(Defining):
 
     def value(self, x: Array) -> float:
         """Return e at x."""
-        return float(self.function(Trial.without_tangent(self.base, x)))
+        return float(self.event.function(Trial.without_tangent(self.base, x)))
+
+    def is_confirmed(self, x: Array) -> bool:
+        """Return whether a zero of e at x is what the event looks for."""
+        return self.event.confirm is None or bool(self.event.confirm(Trial.without_tangent(self.base, x)))
 
     def own_values(self, x: Array) -> Array:
         """Return e."""
@@ -100,20 +101,30 @@ class EventCurve(Defining):
         return gradient[None]
 
     def events(self) -> list[Event]:
-        """Return that of the end where cycles shrink, and those of solutions that are special in another way, too."""
-        others = [test for test in self.base.events_on_curves() if test.label != self.label]
+        """Return those of ends, and those of solutions that are special in another way, too.
+
+        The curve ends where cycles shrink, and where zeros are not confirmed any more.
+        """
+        others = [test for test in self.base.events_on_curves() if test.label != self.event.label]
         inside = [
             dataclasses.replace(
                 test, function=partial(_inside, test.function), confirm=test.confirm and partial(_inside, test.confirm)
             )
             for test in others
         ]
-        return [*super().events(), *inside]
+        name = f"the end of {self.event.name!r}, whose confirm returns False"
+        ends = [Event("EP", name, _confirmed, terminal=True)] if self.event.confirm else []
+        return [*super().events(), *ends, *inside]
 
     def judged(self, point: SpecialPoint) -> SpecialPoint:
         """Return a special point, by the label and name that the kind knows it by."""
         found: SpecialPoint = self.base.judged_on_curve(point, _solution(point.trial))
         return found
+
+
+def _confirmed(trial: Trial) -> float:
+    system: Any = trial.system
+    return 1.0 if system.is_confirmed(trial.x) else -1.0
 
 
 def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:

@@ -253,13 +253,23 @@ class AlgebraicEquations(System):
     def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
         """Return the eigenvalues at several places; those of small matrices are computed together."""
         new = [x for x in places if x.tobytes() not in self._found]
-        matrices = np.array([] if self.is_sparse else [self.jacobian(x) for x in new])
-        if len(matrices) and np.isfinite(matrices).all():
-            found = eigenvalues(matrices)
-            near = may_be_on_axis(found).any()
-            for x, matrix, values in zip(new, matrices, found):
-                self._keep(x.tobytes(), (off_axis(eigenvalues, matrix, values) if near else values, values))
+        for x, found in zip(new, self.spectra(new) if new else ()):
+            self._keep(x.tobytes(), found)
         return [self.eigenvalues(x) for x in places]
+
+    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
+        """Return the eigenvalues at places: those of pairs on the axis up to round-off with the real part 0, and as computed.
+
+        This is the notion of stability of the kind of problem: whatever asks for eigenvalues asks this.
+        """
+        if self.is_sparse:
+            return [(found, found) for found in (rightmost(self.as_field().field_jacobian(x)) for x in places)]
+        matrices = np.array([self.jacobian(x) for x in places])
+        finite = np.isfinite(matrices).all()
+        found = eigenvalues(matrices) if finite else np.array([eigenvalues(matrix) for matrix in matrices])
+        if finite and not may_be_on_axis(found).any():
+            return [(values, values) for values in found]
+        return [(off_axis(eigenvalues, matrix, values), values) for matrix, values in zip(matrices, found)]
 
     def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
         if len(self._found) > _KEPT:
@@ -270,17 +280,8 @@ class AlgebraicEquations(System):
         """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
         key = x.tobytes()
         if key not in self._found:
-            self._keep(key, self._all_eigenvalues(x))
+            self._keep(key, self.spectra([x])[0])
         return self._found[key]
-
-    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Return the eigenvalues, those of pairs on the axis up to round-off with the real part 0, and as computed."""
-        if self.is_sparse:
-            found = rightmost(self.as_field().field_jacobian(x))
-            return found, found
-        matrix = self.jacobian(x)
-        found = eigenvalues(matrix)
-        return off_axis(eigenvalues, matrix, found), found
 
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""

@@ -68,10 +68,6 @@ class Algebraic(AlgebraicEquations):
         """Return the number of unstable eigenvalues; None of large problems, and where nothing moves in time."""
         return None if self.is_sparse or not self.problem.dynamics else int(np.count_nonzero(self.eigenvalues(x).real > 0))
 
-    def degenerate(self, x: Array) -> str:
-        """Return which equations are dependent."""
-        return dependence(self, x)
-
     def undetermined(self, x: Array) -> str:
         """Return which equations are dependent."""
         return dependence(self, x)
@@ -85,8 +81,8 @@ class Algebraic(AlgebraicEquations):
         """Return that of Hopf points."""
         if point.label != HopfCurve.kind:
             return None
-        frequency = critical_pair(self.jacobian(x), frequency_of(point)).frequency
-        return HopfCurve(self.as_field(), size=frequency**2), np.append(x, 1.0)
+        pair = critical_pair(self.jacobian(x), frequency_of(point))
+        return (HopfCurve(self.as_field(), size=pair.frequency**2), np.append(x, 1.0)) if pair.is_critical else None
 
     def events_on_folds(self) -> list[Event]:
         """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""
@@ -98,4 +94,8 @@ class Algebraic(AlgebraicEquations):
 
     def coefficient(self, point: SpecialPoint) -> Coefficient | None:
         """Return the first Lyapunov coefficient at a Hopf point; of folds, which take .3 ms, nothing."""
-        return None if point.test is None or point.test.normal_form is fold else at_special_point(self, point)
+        if point.test is None or point.test.normal_form is fold:
+            return None
+        frequency = frequency_of(point)
+        is_of_the_field = frequency is None or critical_pair(self.jacobian(point.trial.x), frequency).is_critical
+        return at_special_point(self, point) if is_of_the_field else None

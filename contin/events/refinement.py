@@ -196,8 +196,8 @@ def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discret
     if known.has_equations:
         found = known.again(system, carry, trial.x, newton)
         return found.there(system, carry(trial.tangent)), found, 0.0
-    zero_again, apart = _zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton)
-    return zero_again, details, apart
+    found, apart = zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton)
+    return found, details, apart
 
 
 class _Nearest(Finding):
@@ -214,7 +214,7 @@ class _Nearest(Finding):
 _NEAREST = _Nearest()
 
 
-def _zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
+def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
     """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected.
 
     With how far off it may lie: where round-off of the function ends the secant method, the sign of the function decides.

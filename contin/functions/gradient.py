@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 
+from contin import checks
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.recorded_arrays import NUMPY
@@ -13,6 +14,7 @@ from contin.functions.recording import recorded_paths
 from contin.functions.tape import Tape, Unrecordable
 
 
+@checks.arguments
 def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple[float, ...]]:
     """Return the function of (value, derivatives by some arguments), with the arguments of ``function``.
 
@@ -37,6 +39,7 @@ def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[...,
     (18.0, 12.0, 9.0)
     """
     arguments = list(inspect.signature(function).parameters)
+    by = checks.chosen("by", by, arguments)
     tape = Tape(NUMPY)
     inputs = [tape.input(("argument", name)) for name in arguments]  # apart from "t", the slot of the time
     try:

@@ -15,12 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.interpreter import evaluated
 from contin.functions.program import Inputs, Program, program
 from contin.functions.recorded_arrays import NUMPY, recorded, select
 from contin.functions.recording import recorded_paths
+from contin.functions.signature import argument_count
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -251,9 +253,14 @@ def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
 
 def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any], Callable[..., Any], Tape | None]:
     """Return the starts, a function of recorded numbers, and the tape on which it is recorded (None for ordinary numbers)."""
-    starts = list(start)
+    starts = list(checks.sequence("start", start, "numbers"))
+    for each in starts:
+        if not (isinstance(each, Number) or checks.is_number(each)):
+            raise ProblemError(f"start: {checks.shown(each)} must be a number")
     if not 1 <= len(starts) <= _MOST:
         raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
+    if argument_count(checks.function("function", function)) != 1:
+        raise ProblemError(f"function: {checks.shown(function)} must take 1 argument, a list of the unknowns")
     function = prepared(function)
     return starts, function, _tape_of(function, starts)
 

@@ -124,6 +124,7 @@ class _Block:
         return AutoBranch(dict(zip(names, values.T)), [_label(head[2]) if head[3] else "" for head in self.heads])
 
 
+@checks.arguments
 def read_auto(folder: str | Path, name: str | None = None, *, parameters: Mapping[int, str] | None = None) -> list[AutoBranch]:
     """Read the branches that AUTO-07p wrote: ``b.NAME`` and ``s.NAME``, or fort.7 and fort.8.
 
@@ -162,10 +163,6 @@ def read_auto(folder: str | Path, name: str | None = None, *, parameters: Mappin
     [AutoBranch(1 points: EP; mu, L2-NORM)]
     """
     given = {} if parameters is None else parameters
-    if not isinstance(given, Mapping) or not all(isinstance(i, int) and isinstance(word, str) for i, word in given.items()):
-        raise ProblemError(
-            f"parameters: {checks.shown(given)} must be a dict from AUTO's numbers to names, such as {{1: 'mu'}}"
-        )
     files = [Path(folder) / (f"fort.{unit}" if name is None else f"{letter}.{name}") for letter, unit in (("b", 7), ("s", 8))]
     texts = [file.read_text(encoding="utf-8", errors="replace") for file in files]
     try:

@@ -8,6 +8,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array
 from contin.core.state import Stop
 from contin.results import plot, table
@@ -74,6 +75,7 @@ class Branch:
         """
         return self.column(which) if isinstance(which, str) else self.points[which]
 
+    @checks.arguments
     def column(self, name: str) -> Array:
         """Return a parameter or functional over all points.
 
@@ -87,6 +89,7 @@ class Branch:
         """
         return np.array([point[name] for point in self.points])
 
+    @checks.arguments
     def labelled(self, label: str) -> list[Point]:
         """Return the points that carry a label, in order, as a run found them.
 
@@ -124,6 +127,7 @@ class Branch:
         """
         return table.to_pandas(self.points)
 
+    @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 

@@ -60,6 +60,7 @@ class StoredColumns:
         return f"StoredColumns({len(self.labels)} points, columns {checks.listed(self.columns)}: {labels}; {self.stop})"
 
 
+@checks.arguments
 def read_columns(path: str | Path) -> StoredColumns:
     """Read what a file of `contin.save` holds without the problem, which is code: columns, labels and states.
 

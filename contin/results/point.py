@@ -16,6 +16,7 @@ from contin.core.protocol import Discretization
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
 from contin.errors import ProblemError
+from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
@@ -142,6 +143,7 @@ class Point(Record):
         own = curve.kind if self.label != "HH" else ""
         return tuple(kind for kind in curve.base.leaving.get(self.label, ()) if kind != own)
 
+    @checks.arguments
     def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
         """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
 
@@ -177,6 +179,7 @@ class Point(Record):
         """
         return portrait.plot(underlying(self), what, states, axes)
 
+    @checks.arguments
     def sensitivities(
         self, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
     ) -> dict[str, dict[str, float]]:
@@ -217,6 +220,7 @@ class Point(Record):
         checks.instance("point", self, Point, "a Point")  # of `contin.sensitivities`, as it was called in version 0.2
         return sensitivities(self, by, held)
 
+    @checks.arguments
     def segment(self, index: int) -> Profile:
         """Return the solution on one segment of a `SegmentedProblem`, over its own coordinate; segments count from 0.
 
@@ -239,6 +243,47 @@ class Point(Record):
         0.25
         """
         return Profile(underlying(self), index)
+
+    @checks.arguments
+    def error(self, functional: str | Callable[[Trial], float]) -> float:
+        """Return the estimated error of a column, or of a function of the solution: all of it.
+
+        That is what halving the mesh changes, what Newton's method and round-off left, and at special points what the column
+        changes over the distance that their place is known to.
+
+        Parameters
+        ----------
+        functional : str or callable
+            A parameter, a functional, a state of an equilibrium, or ``functional(trial)``.
+
+        Returns
+        -------
+        float
+            NaN where the point is not found again.
+
+        Raises
+        ------
+        ProblemError
+            There is no such column.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> bratu = contin.BoundaryValueProblem(
+        ...     lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 1.0},
+        ...     functionals={"mean": lambda t, u, p: u.u},
+        ... )
+        >>> point = contin.solve(bratu, [0, 0], intervals=4, degree=3)
+        >>> exact = contin.solve(bratu, [0, 0], intervals=40)
+        >>> abs(point["mean"] - exact["mean"]) < point.error("mean") < 1e-6
+        True
+        """
+        if callable(functional):
+            return float(error(self, functional))
+        known = (*self.parameters, *self.functionals, *self.system.named_states)
+        if functional not in known:
+            raise ProblemError(f"functional: {checks.shown(functional)} is no column; there are {checks.listed(known)}")
+        return float(error(self, lambda trial: trial[functional]))
 
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.
@@ -283,8 +328,8 @@ class Point(Record):
         >>> {name: round(load, 9) for name, load in contin.solve(string, [0.0]).phase_loads().items()}
         {'mu_place': -1.0}
         """
-        error = self.newton_error + float(np.nan_to_num(self.discretization_error))
-        return {name: load for name, load, _ in phase_loads(self.system, self.x, (), error)}
+        left = self.newton_error + float(np.nan_to_num(self.discretization_error))
+        return {name: load for name, load, _ in phase_loads(self.system, self.x, (), left)}
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.

@@ -45,6 +45,7 @@ _PACKAGE = __name__.partition(".")[0] + "."
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
 
+@checks.arguments
 def save(branch: Branch, path: str | Path) -> None:
     """Write a branch, or a curve in two parameters, to a file: all its points, with their solutions.
 
@@ -69,7 +70,6 @@ def save(branch: Branch, path: str | Path) -> None:
     ...     [file.name for file in pathlib.Path(folder).iterdir()]
     ['b.npz']
     """
-    checks.instance("branch", branch, Branch, "a Branch")
     if not branch.points:
         raise ProblemError("branch: has no points")
     systems: list[Any] = []
@@ -143,6 +143,7 @@ def _numbers(details: Any) -> dict[str, float] | None:
     return {str(name): value if isinstance(value, int) else float(value) for name, value in details.items()}
 
 
+@checks.arguments
 def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
     """Read a branch from a file, as points of ``problem``.
 
@@ -165,7 +166,6 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     >>> str(trace(again.points[-1], limits={"a": (-1, 9)}).stop)
     'reached a = 9'
     """
-    checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
         own = _statement(problem)

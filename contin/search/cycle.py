@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,8 +37,10 @@ _SAMPLES = 1000
 _MOST_ROUNDS, _CLOSED = 16, 1e-3
 
 
+@checks.arguments
 def cycle(
-    problem: CycleProblem, start: Any, parameters: Any = None, *, settle: float = 100.0, intervals: int = 40,
+    problem: CycleProblem, start: Sequence[float], parameters: Mapping[str, float] | None = None, *, settle: float = 100.0,
+    intervals: int = 40,
     degree: int | None = None,
 ) -> Point:  # fmt: skip
     """Return the stable cycle that a time integration from ``start`` settles on.
@@ -71,9 +73,8 @@ def cycle(
     >>> round(cycle(problem, [1.0, 0.0])["period"], 6)
     6.663287
     """
-    checks.instance("problem", problem, CycleProblem, "a CycleProblem")
     checks.number("settle", settle, 0)
-    values = {**problem.parameters, **checks.mapping("parameters", parameters or {}, "numbers")}
+    values = {**problem.parameters, **(parameters or {})}
     first = _numbers(start, len(problem.state_names))
     field = _vector_field(problem, values)
     if problem.period is None:
@@ -87,7 +88,7 @@ def cycle(
     return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
 
 
-def _numbers(start: Any, count: int) -> Array:
+def _numbers(start: Sequence[float], count: int) -> Array:
     array = np.asarray(start, dtype=float).ravel()
     if array.size != count or not np.isfinite(array).all():
         raise ProblemError(f"start: {checks.shown(start)} must be {count} finite numbers, the states")

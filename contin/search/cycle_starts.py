@@ -74,6 +74,8 @@ def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Ar
     if point.label != "HB" or system.is_cycle or not system.starts_cycles:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
+    if not pair.is_critical:
+        raise ProblemError("start: the Jacobian of the field has no pair on the imaginary axis there, of which cycles begin")
     cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, intervals)
     scaled, x = _in_sizes_of_the_equilibrium(cycles, x)
     if scaled is not cycles:

@@ -76,6 +76,7 @@ class Diagram:
         head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
         return "\n".join([head, *lines])
 
+    @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
 
@@ -346,6 +347,7 @@ def _seen(system: Any, x: Array) -> Array:
     return x
 
 
+@checks.arguments
 def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
     symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Unpack[Options],
@@ -386,11 +388,10 @@ def diagram(
     >>> [str(branch.stop) for branch in found.branches]
     ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
     """
-    checks.instance("start", start, Point, "a Point")
     checks.whole("depth", depth, 0, 1000)
     checks.number("tolerance", tolerance, 0)
-    for symmetry in checks.sequence("symmetries", symmetries, "functions"):
-        if argument_count(checks.function("symmetries", symmetry)) != 2:
+    for symmetry in symmetries:
+        if argument_count(symmetry) != 2:
             raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
     settings = settings_with(settings, options)
     symmetries = [*symmetries, *declared(system_of(start, "start").problem, "symmetries").values()]

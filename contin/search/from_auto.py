@@ -36,6 +36,7 @@ _CLOSE = 1e-2
 _PERIOD = "PAR(11)"
 
 
+@checks.arguments
 def from_auto(
     problem: BoundaryValueProblem | AlgebraicProblem, solution: AutoSolution, *, free: Sequence[str],
     parameters: Mapping[str, float] | None = None,
@@ -70,13 +71,11 @@ def from_auto(
     >>> fold.label, abs(fold["a"]) < 1e-12
     ('LP', True)
     """
-    checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
-    checks.instance("solution", solution, AutoSolution, "an AutoSolution")
     if solution.states.shape[1] != len(problem.state_names):
         raise ProblemError(
             f"solution: {solution.states.shape[1]} states must be {len(problem.state_names)}, as the problem has"
         )
-    values = _values(problem, solution, checks.mapping("parameters", parameters or {}, "numbers"))
+    values = _values(problem, solution, parameters or {})
     system, x = _system(problem, solution, with_multipliers(problem, checks.names("free", free)), values)
     if solution.label not in _LOCATED:
         return next(iter(Continuation(system, x)))

@@ -25,7 +25,8 @@ from contin.search.lagrange import with_guessed_multipliers
 #: larger, the first mesh has a longer interval there; it is adapted in any case.
 _LEAST_INTERVAL = 1e-3
 
-Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
+#: A function of t, a point, numbers, (t, states), or one of these for each segment.
+Guess = Callable[[float], Any] | Point | float | Sequence[Any] | Array | None
 
 
 @dataclass(frozen=True)

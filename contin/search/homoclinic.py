@@ -29,6 +29,7 @@ from contin.search.solving import solved
 _INTERVALS = 60
 
 
+@checks.arguments
 def homoclinic(
     start: Point, free: Sequence[str], *, limits: Mapping[str, tuple[float, float]] | None = None, direction: int = 1,
     mesh: MeshControl | None = None, newton: Newton = Newton(),
@@ -80,7 +81,6 @@ def homoclinic(
     >>> abs(grown["mu"] - orbit["mu"]) < 1e-6
     True
     """
-    checks.instance("start", start, Point, "a Point")
     control = MeshControl() if mesh is None else mesh
     system: Any = start.system
     if not system.on_curve and not system.intervals and declared(system.problem, "dynamics"):

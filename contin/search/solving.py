@@ -28,6 +28,7 @@ from contin.search.guess import Guess, Options, first_guess
 _ROUNDS = 4
 
 
+@checks.arguments
 def solve(
     problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess = None, parameters: Mapping[str, float] | None = None, *,
     free: Sequence[str] = (), intervals: int = 20, degree: int | None = None, mesh: MeshControl | None = None,
@@ -74,7 +75,7 @@ def solve(
     (2.0, -2.0)
     """
     control = MeshControl() if mesh is None else mesh
-    _check_options(problem, intervals, degree, control, newton)
+    checks.whole("intervals", intervals, 1, MOST_INTERVALS)
     _check_others(problem, others)
     forget_changed(problem)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
@@ -83,15 +84,20 @@ def solve(
         read = winding_names(problem.angles)  # off the guess, as of all others
         parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
     held = _check_count(problem, free)
-    options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
+    options = Options(parameters, free, intervals, _degree(problem, guess, control, degree))
     system, x = first_guess(problem, guess, options)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others, held)
 
 
-def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
-    """Return the degree where none is given."""
+def _degree(
+    problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl, given: int | None
+) -> int:  # fmt: skip
+    """Return the degree that is given; without one that of the guess, or the usual one."""
+    if given is not None:
+        checks.whole("degree", given, DEGREES[0], DEGREES[-1])
+        return given
     if isinstance(guess, Point) and guess.system.is_function_of_t:
         return guess.system.degree
     return problem.usual_degree(control.tolerance)
@@ -185,15 +191,6 @@ def _check_determined(system: System, x: Array) -> None:
         raise ProblemError(reason)
 
 
-def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:
-    checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
-    checks.whole("intervals", intervals, 1, MOST_INTERVALS)
-    if degree is not None:
-        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
-    checks.instance("mesh", control, MeshControl, "a MeshControl")
-    checks.instance("newton", newton, Newton, "a Newton")
-
-
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
     """Return the free parameter that is held because another one is found in its place, if there is one.
 
@@ -215,8 +212,7 @@ def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequenc
 
 
 def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
-    for other in checks.sequence("others", others, "Point"):
-        checks.instance("others", other, Point, "a Point")
+    for other in others:
         if system_of(other, "others").problem.states != problem.states:
             raise ProblemError("others: must be solutions of this problem")
 

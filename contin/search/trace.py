@@ -28,6 +28,7 @@ from contin.search.cycle_starts import switched, switches
 _HERE = 1e-5
 
 
+@checks.arguments
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
           tangent: Array | None = None, progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
@@ -67,7 +68,6 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     >>> print(round(abs(forked.points[-1].x[0]), 9))
     1.0
     """
-    checks.instance("start", start, Point, "a Point")
     settings, shown = settings_with(settings, options), Progress(progress)
     system, x, along, singular = _first(start, settings, free, branch, tangent)
     return follow_until_interrupted(Continuation(system, x, settings, along, singular=singular), shown)

@@ -27,6 +27,7 @@ from contin.results.point import Point
 from contin.search.codimension_two import leaving
 
 
+@checks.arguments
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
           event: Event | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
           progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
@@ -78,7 +79,6 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     >>> [(point.label, abs(point["b"]) < 1e-9) for point in folds.labelled("CP")]
     [('CP', True)]
     """
-    checks.instance("start", start, Point, "a Point")
     shown, new = Progress(progress), any(each is not None for each in (second, free, event, hold))
     goes_on = start.system.on_curve and not new
     _check(event, hold, kind, branch, goes_on)
@@ -89,9 +89,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     return follow_until_interrupted(Continuation(*_first_of_curve(start, names, event, hold), settings), shown)
 
 
-def _check(event: object, hold: object, kind: object, branch: object, goes_on: bool) -> None:
-    checks.instance("event", event, (Event, type(None)), "an Event")
-    checks.instance("kind", kind, (str, type(None)), "a name")
+def _check(event: Event | None, hold: str | None, kind: str | None, branch: int, goes_on: bool) -> None:
     checks.whole("branch", branch, 0, 1)
     if kind is not None and not goes_on:
         raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
@@ -123,7 +121,6 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
     if free is None:
         assert second is not None
-        checks.instance("second", second, str, "a name")
         if second in system.free or second not in known:
             raise ProblemError(f"second: {second!r} must be a parameter that is not free ({', '.join(known)})")
         pair: tuple[str, ...] = (found_in, second)
@@ -200,7 +197,6 @@ def _holding(start: Point, column: str) -> Point:
     ProblemError
         There is no such column.
     """
-    checks.instance("hold", column, str, "the name of a column")
     known = (*start.parameters, *start.functionals, *start.system.named_states)
     if column not in known:
         raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
@@ -212,7 +208,8 @@ def _value(start: Point, base: Any, x: Array) -> _First:
     column, value = start.column, start.value
     assert value is not None
     known = base.column_gradient(x, column) is not None
-    return EventCurve(base, partial(_off, column, value), partial(_slope, column) if known else None), x
+    event = Event(start.label, column, partial(_off, column, value))
+    return EventCurve(base, event, partial(_slope, column) if known else None), x
 
 
 def _off(column: str, value: float, trial: Trial) -> float:
@@ -229,7 +226,7 @@ def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     """A point that a test function of its curve has labelled."""
     for test in start.system.events():
         if (test.label, test.name) == (start.label, start.name):
-            return EventCurve(base, test.function), x
+            return EventCurve(base, test), x
     return None
 
 
@@ -241,10 +238,12 @@ def _event(start: Point, base: Any, x: Array, event: Event) -> _First:
     ProblemError
         It is no zero of that.
     """
-    found = EventCurve(base, event.function)
+    found = EventCurve(base, event)
     here, slope = found.value(x), found.own_gradients(x)[0]
     if not abs(here) <= _LOCATED * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
         raise ProblemError(f"event: {event.name!r} is {here:.6g} at the start; it must be the function that labelled it")
+    if not found.is_confirmed(x):
+        raise ProblemError(f"event: confirm of {event.name!r} returns False at the start; it must be the one that labelled it")
     return found, x
 
 

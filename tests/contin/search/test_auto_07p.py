@@ -144,7 +144,7 @@ def test_a_file_that_is_none_of_auto_is_named(tmp_path, text):
         read_auto(tmp_path, "x")
     with pytest.raises(FileNotFoundError):
         read_auto(tmp_path, "none")
-    with pytest.raises(ProblemError, match="parameters: .* must be a dict from AUTO's numbers to names"):
+    with pytest.raises(ProblemError, match="parameters: .* must be a dict from whole numbers to names"):
         read_auto(STORED, "rest", parameters={"p1": 1})
 
 

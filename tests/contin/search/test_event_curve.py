@@ -125,3 +125,16 @@ def test_wrong_events():
         curve(start, "eps")
     with pytest.raises(ProblemError, match="event: 'cold' is 1 at the start; it must be the function that labelled it"):
         curve(start, "eps", event=Event("UZ", "cold", lambda trial: middle(trial) + 1.0))
+
+
+def test_a_curve_ends_where_its_event_is_not_confirmed():
+    """x = a b = 0.3 counts below b = 0.7 only."""
+    plane = AlgebraicProblem(lambda u, p: (u.x - p.a * p.b,), ["x"], {"a": 1.0, "b": 0.5})
+    event = Event("UZ", "low", lambda trial: trial["x"] - 0.3, confirm=lambda trial: trial["b"] < 0.7)
+    (start,) = trace(solve(plane, [0.5]), free=["a"], direction=-1, limits={"a": (0, 2)}, events=[event]).labelled("UZ")
+    found = curve(start, "b", event=event, limits={"b": (0.1, 2)})
+    assert "the end of 'low'" in str(found.stop) and found[-1]["b"] == pytest.approx(0.7, abs=1e-6)
+    assert max(abs(point["a"] * point["b"] - 0.3) for point in found) < 1e-9
+    other = Event("UZ", "high", event.function, confirm=lambda trial: trial["b"] > 0.7)
+    with pytest.raises(ProblemError, match="confirm of 'high' returns False at the start"):
+        curve(start, "b", event=other)
