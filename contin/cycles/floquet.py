@@ -12,7 +12,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +30,10 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
-from contin.events.nearness import AS_FAR, CIRCLE, DEEPER, LOOKS, MINUS_ONE, ONE, comes_near
+from contin.events.nearness import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.normal_forms import flip, pair
 from contin.events.significance import on_finer_mesh
+from contin.events.zeros import separated
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
@@ -227,13 +228,7 @@ def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     if _mean_little(arc.before) and _mean_little(arc.trial):  # what is found is round-off, and takes long
         lost = SpecialPoint(arc.step, test.label, test.name, arc.trial, test=test, is_located=False)
         return [lost] if sign_changed(known[0], known[-1]) else []
-    inside = [arc.step * part for part in LOOKS]
-    looked = sorted([*knots, *((s, arc.guessed(s)) for s in inside)], key=lambda place: place[0])
-    values = [trial.value(test) for _, trial in looked]
-    if not np.isfinite(values).all() or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
-        return []
-    knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda place: place[0])
-    knots = sorted([*knots, *_below(arc, knots, test)], key=lambda place: place[0])
+    knots = separated(arc, test, knots, LOOKS)
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
               if sign_changed(left[1].value(test), right[1].value(test))
               and _changes_on_finer_mesh(left[1], right[1], test, arc.newton)]  # fmt: skip
@@ -272,68 +267,6 @@ def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newto
     finer = [on_finer_mesh(trial, newton) for trial in (left, right)]
     values = [trial.value(test) for trial in finer if trial is not None]
     return len(values) == 2 and sign_changed(*values)
-
-
-def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:
-    """Return where, between three places of the same sign, a parabola through the values comes near zero or passes it.
-
-    With half its second derivative.
-    """
-    found = []
-    for three, at_three in zip(zip(places, places[1:], places[2:]), zip(values, values[1:], values[2:])):
-        if len(set(np.sign(at_three))) > 1:
-            continue
-        at, square, lowest = _parabola([s for s, _ in three], at_three)
-        if square > 0 and three[0][0] < at < three[2][0] and lowest < DEEPER * min(map(abs, at_three)):
-            found.append((at, square))
-    return found
-
-
-def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
-    """Return vertex, half the second derivative and value at the vertex of the parabola through three absolute values."""
-    (a, b, c), (first, middle, last) = places, map(abs, values)
-    if not a < b < c:
-        return math.nan, 0.0, math.nan
-    before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
-    square = (behind - before) / (c - a)
-    linear = before + square * (b - a)  # the slope at b
-    if not square > 0:
-        return math.nan, square, math.nan
-    return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
-
-
-def _below(arc: Arc, knots: list[Place], test: Event) -> list[Place]:
-    """Return places of the other sign, found by following the dips between places of one sign."""
-    dips = _dips(knots, [trial.value(test) for _, trial in knots])
-    found = (_followed(arc, at, square, test) for at, square in dips)
-    return [place for place in found if place is not None]
-
-
-def _followed(arc: Arc, at: float, square: float, test: Event) -> Place | None:
-    """Return a place near ``at`` where a function that dips towards zero has passed it; None where it turns before.
-
-    ``square`` is about half its second derivative: by that and the value, the lowest place is no further off than the places
-    on both sides that are looked at.
-    """
-    sign, lowest = np.sign(arc.before.value(test)), math.inf
-    while True:
-        here = at, arc.near(at)
-        value = sign * here[1].value(test)
-        if value < 0:
-            return here
-        if not value < DEEPER * lowest:
-            return None
-        lowest = value
-        apart = math.sqrt(value / square)
-        if not 0 < at - apart < at + apart < arc.step:
-            return None
-        sides = [(s, arc.near(s)) for s in (at - apart, at + apart)]
-        values = [sign * trial.value(test) for _, trial in sides]
-        if min(values) < 0:
-            return sides[int(np.argmin(values))]
-        at, square, _ = _parabola((at - apart, at, at + apart), (values[0], value, values[1]))
-        if not square > 0 or not 0 < at < arc.step:
-            return None
 
 
 def critical_angle(system: PeriodicEquations | MapEquations, point: Any, x: Array) -> float:

@@ -20,6 +20,7 @@ from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.significance import passed_before, senses
+from contin.events.zeros import followed
 from contin.functions.kernel_parts import helper
 
 #: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
@@ -28,10 +29,8 @@ _ROUND_OFF = 1e-9
 _FLAT = 1e-15
 #: Units in the last place by which a parameter may differ between two points where it is the same.
 _UNITS = 16
-#: A rate that sinks to this part of its values at the ends may pass zero, ...
+#: A rate that sinks to this part of its values at the ends may pass zero.
 _SHALLOW = 0.5
-#: ... and the search for a smallest rate goes on while it lowers it to this part at least.
-_DEEPER = 0.5
 #: The rate right beside a pitchfork's fold is taken at this part of the step from it. Closer, tangents are blurred; further
 #: away, another fold would be between.
 _ASIDE = 1e-2
@@ -220,32 +219,16 @@ class FoldSearch:
         if not (first or last):
             return None
         sense = math.copysign(1.0, first or last)
-        place, square = self._suspect(left, right, parabola if sense > 0 else parabola.times(sense))
-        lowest, flat = np.inf, _FLAT * max(abs(first), abs(last))
-        while place is not None:
-            value = sense * self.rate(place[1])
-            if value < -flat:
-                return place
-            if value <= flat:
-                return None  # an inflection
-            if value > _DEEPER * lowest:
-                return None
-            lowest = value
-            apart = self._distance(place, np.sqrt(value / square), left, right)
-            if apart is None:
-                return None
-            near = [(s, self.arc.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
-            values = [sense * self.rate(trial) for _, trial in near]
-            if min(values) < -flat:
-                return near[int(np.argmin(values))]
-            bend = values[1] - 2 * values[0] + value
-            if not bend > 0:
-                return None
-            s = place[0] + apart * (0.5 - (values[0] - value) / bend)
-            place = (s, self.arc.at(s)) if left[0] < s < right[0] else None
-        return None
+        at, square = self._suspect(left, right, parabola if sense > 0 else parabola.times(sense))
+        if at is None:
+            return None
+        flat = _FLAT * max(abs(first), abs(last))
+        return followed(self._place, lambda trial: sense * self.rate(trial), (at, square), (left[0], right[0]), flat)
 
-    def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[Place | None, float]:
+    def _place(self, s: float) -> Place:
+        return s, self.arc.at(s)
+
+    def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[float | None, float]:
         """Return a place between two where the rate could come near zero, or None, and half its second derivative.
 
         That is the vertex of the parabola, which is positive at both ends. Where it lies outside, but the rate at one end is
@@ -254,16 +237,5 @@ class FoldSearch:
         a, width = left[0], right[0] - left[0]
         first, last, linear, square = parabola
         if parabola.dips:
-            s = a - width * linear / (2 * square)
-            return (s, self.arc.at(s)), square / width**2
-        return (left if first < last else right) if parabola.ends_low else None, square / width**2
-
-    @staticmethod
-    def _distance(place: Place, apart: float, left: Place, right: Place) -> float | None:
-        """Return the signed distance between three places, the first given, so that all lie between the ends; None if none do.
-
-        At ``apart`` the rate doubles from one place to the next if it is smallest in the first.
-        """
-        if place[0] + 2 * apart >= right[0]:
-            apart = -apart
-        return apart if place[0] + 2 * apart >= left[0] else None
+            return a - width * linear / (2 * square), square / width**2
+        return (left if first < last else right)[0] if parabola.ends_low else None, square / width**2

@@ -55,7 +55,7 @@ def hopf() -> Event:
 
 def may_pass(arc: Arc) -> bool:
     """Return whether a pair may pass the axis inside a step, by how far eigenvalues move between its ends."""
-    return _moving([(arc.low, arc.before), (arc.step, arc.trial)])[0]
+    return _moving([(arc.low, arc.before), (arc.step, arc.trial)])[0][0]
 
 
 def critical_real_part(frequency: float) -> Callable[[Trial], float]:
@@ -96,15 +96,14 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
         return []  # all eigenvalues are real
     inside = sorted({arc.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
     looked = sorted([*knots, *((s, arc.guessed(s)) for s in inside)], key=lambda knot: knot[0])
-    moves = _moving(looked)
+    moves, unclear = _moving(looked)
     if not any(moves):
         return []
-    passed = _passed(looked, moves)
     if arc.trial.system.size <= _SMALL:  # otherwise each place takes long
-        closely = _passed(*_looked_at_closely(arc, looked, moves))
-        if len(closely) > len(passed):
-            passed, inside = closely, sorted({*inside, *(s for pair in closely for s in pair)} - {s for s, _ in knots})
-    if passed:
+        looked, moves = _looked_at_closely(arc, looked, moves, unclear)
+    passed = _passed(looked, moves)
+    if len(passed) > 1 or (passed and not any(_passes_as_pair(a[1], b[1]) for a, b in itertools.pairwise(knots))):
+        inside = sorted({*inside, *(s for pair in passed for s in pair)} - {s for s, _ in knots})
         knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
@@ -112,40 +111,55 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     return _joined(sorted(found, key=lambda point: point.at), arc)
 
 
-def _moving(places: list[Place]) -> list[bool]:
-    """Return between which of some places a pair of eigenvalues may move to the imaginary axis, by how far all of them move.
+def _moving(places: list[Place]) -> tuple[list[bool], list[bool]]:
+    """Return between which of some places a pair may move to the imaginary axis, and where it is not clear how often.
 
-    Where all move less than they are from it, each is nearer to one on its own side of the axis than to any on the other: none
-    changes the side. Those on the axis at both places do not count, nor does the one that is nearest to it: a pair is two. They
-    are taken to move as fast as beside the two places too: ones that go to the axis and come back look as if they stood.
+    An eigenvalue that moves less than it is from the axis does not change the side. Those on the axis at both places do not
+    count, and one alone is no pair. They are taken to move as fast as beside the two places too: ones that go to the axis and
+    come back look as if they stood. One that is on one side, keeps its direction there and beside, and meets no other one does
+    not come back. Where no others come near the axis than two that pass, one pair passes once.
     """
     system: Any = places[0][1].system
     values = system.eigenvalues_at([trial.x for _, trial in places])
     if not values[0].size or any(len(each) != len(values[0]) for each in values):
-        return [True] * (len(places) - 1)
+        return [True] * (len(places) - 1), [True] * (len(places) - 1)
     along = np.sort(np.array(values), axis=1)
-    sizes = np.abs(along.real)
-    distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1]))
-    distances = np.sort(distances, axis=1)[:, 1] if distances.shape[1] > 1 else np.full(len(distances), np.inf)
-    lengths = np.diff([s for s, _ in places])
-    speeds = np.zeros(len(lengths) + 2)
-    speeds[1:-1] = np.abs(along[1:] - along[:-1]).max(axis=1) / lengths
-    fastest = np.maximum(np.maximum(speeds[:-2], speeds[2:]), speeds[1:-1])
-    return [not far < distance for far, distance in zip(fastest * lengths, distances)]
+    real, lengths = along.real, np.diff([s for s, _ in places])[:, None]
+    distances = np.where((real[1:] == 0) & (real[:-1] == 0), np.inf, np.minimum(np.abs(real[1:]), np.abs(real[:-1])))
+    far = _largest_beside(np.abs(np.diff(along, axis=0)) / lengths) * lengths
+    near = ~(far < distances)
+    if len(places) > 2 and near.any():
+        gaps = np.abs(along[:, :, None] - along[:, None, :])
+        np.einsum("pii->pi", gaps)[:] = np.inf
+        gaps = gaps.min(axis=2)
+        apart = np.minimum(gaps[1:], gaps[:-1]) > far + far.max(axis=1, keepdims=True)
+        rates = np.diff(real, axis=0)
+        onwards = -_largest_beside(-rates) * _largest_beside(rates) > 0
+        near &= ~(apart & onwards & (real[1:] * real[:-1] > 0))
+    count = np.count_nonzero(near, axis=1)
+    once = (count == 2) & (np.abs(np.diff(np.count_nonzero(real > 0, axis=1))) == 2)
+    return (count > 1).tolist(), ((count > 1) & ~once).tolist()
 
 
-def _looked_at_closely(arc: Arc, places: list[Place], moves: list[bool]) -> tuple[list[Place], list[bool]]:
-    """Return the places and, where eigenvalues move far between two of them, further ones between these, on the cubic.
+def _largest_beside(rows: Array) -> Array:
+    """Return the largest of each number and of those in the rows before and behind it."""
+    wide = np.concatenate([rows[:1], rows, rows[-1:]])
+    found: Array = np.maximum(np.maximum(wide[:-2], wide[2:]), wide[1:-1])
+    return found
+
+
+def _looked_at_closely(arc: Arc, places: list[Place], moves: list[bool], unclear: list[bool]) -> tuple[list[Place], list[bool]]:
+    """Return the places and, where it is not clear what passes between two of them, further ones between these, on the cubic.
 
     A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks. ``moves`` tells
     where eigenvalues move far, and comes back for the new places.
     """
     for _ in range(_CLOSER):
-        between = [(left[0] + right[0]) / 2 for (left, right), far in zip(itertools.pairwise(places), moves) if far]
+        between = [(left[0] + right[0]) / 2 for (left, right), doubtful in zip(itertools.pairwise(places), unclear) if doubtful]
         if not between:
             break
         places = sorted([*places, *((s, arc.guessed(s)) for s in between)], key=lambda place: place[0])
-        moves = _moving(places)
+        moves, unclear = _moving(places)
     return places, moves
 
 

@@ -25,6 +25,7 @@ from contin.events.branch_points import BranchPointSearch
 from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
 from contin.events.trivial import crossed, round_off
+from contin.events.zeros import separated
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already.
@@ -254,7 +255,8 @@ class Inspection:
     def _pieces(self, test: Event, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
         arc, aside = self.arc, _BESIDE * self.arc.step
-        between = self._looked_at(test, self._knots) if test.looks else self._knots
+        parts = [part / (test.looks + 1) for part in range(1, test.looks + 1)]
+        between = separated(arc, test, self._knots, parts, dips=False) if test.looks else self._knots
         if not same:
             return list(itertools.pairwise(between))
         knots, cut = [], [point.at for point in same]
@@ -265,18 +267,6 @@ class Inspection:
         knots = sorted([*knots, *((s, arc.near(s)) for s in beside)], key=lambda place: place[0])
         pairs = itertools.pairwise(knots)
         return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
-
-    def _looked_at(self, test: Event, knots: list[Place]) -> list[Place]:
-        """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
-        inside = [self.arc.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
-        known = [
-            *((s, trial.value(test)) for s, trial in knots),
-            *((s, test.function(self.arc.guessed(s))) for s in inside),
-        ]
-        signs = np.sign([value for _, value in sorted(known)])
-        if np.count_nonzero(np.diff(signs)) <= 1:
-            return knots
-        return sorted([*knots, *((s, self.arc.near(s)) for s in inside)], key=lambda place: place[0])
 
     @functools.cached_property
     def _knots(self) -> list[Place]:

@@ -142,12 +142,16 @@ class DenseForm(Form):
     def solver(self, coupling: Any, border: Borders | None = None) -> DenseFactors:
         """Return LU factors of L(P)."""
         small, size, n = np.atleast_2d(coupling), self.equations, self._count
-        every, closing = np.eye(len(small)), np.zeros((size, size))
-        closing[size - n :, :n] = np.eye(n)
-        matrix: Any = np.kron(every, self._open) - np.kron(small, closing)
+        copies, rows, columns = len(small), np.arange(size - n, size), np.arange(n)
+        matrix: Any = np.zeros([copies * (size + (border is not None))] * 2, small.dtype)
+        for i, j in np.ndindex(small.shape):
+            block = matrix[i * size : (i + 1) * size, j * size : (j + 1) * size]
+            if i == j:
+                block[:] = self._open
+            block[rows, columns] -= small[i, j]
         if border is not None:
-            (b, c), none = border, np.zeros_like(every)
-            matrix = np.block([[matrix, np.kron(every, b[:, None])], [np.kron(every, c[None, :]), none]])
+            for i, last in enumerate(range(copies * size, len(matrix))):
+                matrix[i * size : (i + 1) * size, last], matrix[last, i * size : (i + 1) * size] = border
         return DenseFactors(matrix)
 
     def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
