@@ -83,10 +83,11 @@ def workspace(system: Any, rows: int) -> Workspace:
     n, field, ends = system._n, system._field, system._boundary
     of_field, of_ends = system._columns
     codes = Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
-    tables = Tables(system.basis.value, system.basis.slope, system.basis.weights)
     whole = share(system.intervals, 0)
-    mesh = Mesh(system._layout, tables, system._h, system._times, system._free, system.state_size, system._conditions, whole)
-    points, empty = system._times.size, np.empty
+    mesh = Mesh(
+        system._layout, system.tables, system._h, system.gauss_times, system._free, system.state_size, system._conditions, whole
+    )
+    points, empty = system.gauss_times.size, np.empty
     values = Values(
         system.scaled_parameters(np.zeros(system.size)), np.full(system.size, np.nan), empty((points, n)), empty((1, n)),
         empty((1, n)), empty((points, field.count)),

@@ -10,7 +10,6 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
 from contin.boundary.conditions import Conditioned
-from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
@@ -410,7 +409,7 @@ class ConnectionEquations(Conditioned):
     # --- columns -------------------------------------------------------------------------------------------------
 
     @property
-    def _integrated(self) -> tuple[str, ...]:
+    def integrated(self) -> tuple[str, ...]:
         """No functional is an integral."""
         return ()
 
@@ -422,12 +421,9 @@ class ConnectionEquations(Conditioned):
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
-    def _with(self, **changes: Any) -> ConnectionEquations:
-        other: Any = super()._with(**changes)
-        if self.reference.size:
-            other = other.with_reference(self._carried(other))
-        found: ConnectionEquations = other
-        return found
+    def _with(self, **changes: Any) -> Self:
+        other = super()._with(**changes)
+        return other.with_reference(self._carried(other)) if self.reference.size else other
 
     def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
         """Return the same on another mesh, with the same reference, and the carrier."""
@@ -441,7 +437,7 @@ class ConnectionEquations(Conditioned):
         carried: Array = other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
         return carried
 
-    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
         mesh = self._better_mesh(x, control)
         if mesh is None and np.abs(x - self.reference).max() <= _MOVED * np.abs(x).max():

@@ -161,7 +161,7 @@ class PeriodicEquations(Collocation):
     # --- columns -------------------------------------------------------------------------------------------------
 
     @property
-    def _integrated(self) -> tuple[str, ...]:
+    def integrated(self) -> tuple[str, ...]:
         """Names of the functionals that are means over a period."""
         return tuple(self.problem.means)
 
@@ -201,7 +201,7 @@ class PeriodicEquations(Collocation):
 
         Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
         """
-        n, times = self._n, np.zeros(len(points)) if self.autonomous else self._times
+        n, times = self._n, np.zeros(len(points)) if self.autonomous else self.gauss_times
         given = times, points, np.empty((0, n)), self._scaled_parameters(x)
         derivatives: Array = self._field.jacobian(*given, self._by_states)[1]
         return derivatives[:, :n, :n]
@@ -217,7 +217,7 @@ class PeriodicEquations(Collocation):
         still, none = np.zeros(self.size), np.empty((0, self._n))
         wide = [self._wide(still, states) for states in directions]
         points, p = self.at_gauss_points(x), self._scaled_parameters(x)
-        found: Array = self._field.along(self._times, points, none, p, wide)[:, : self._n]
+        found: Array = self._field.along(self.gauss_times, points, none, p, wide)[:, : self._n]
         return found
 
     def _jacobian_of_field(self, x: Array) -> Array:
@@ -509,7 +509,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
         other._set_reference(states)
         return other
 
-    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
         mesh, states = self._better_mesh(x, control), self.states(x)
         if mesh is None and np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():

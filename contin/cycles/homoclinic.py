@@ -218,7 +218,7 @@ def limit_of_parameter(system: CycleEquations, x: Array, place: RestingPlace) ->
         value = _extrapolated(system, x, (name, k), 0.0)
         shorter = _extrapolated(system, x, (name, k), np.log(2) / k)
         finer, carry = system.refined()
-        better = _extrapolated(finer, carry(x), (name, k), 0.0)  # type: ignore[arg-type]
+        better = _extrapolated(finer, carry(x), (name, k), 0.0)
     except ConvergenceError:
         return None
     error = abs(value - shorter) + abs(value - better) + np.finfo(float).eps * abs(value)

@@ -96,7 +96,7 @@ def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[Cy
     if all(np.all(found == 1) for found in sizes):
         return cycles, x
     scaled, x = cycles.with_scales(x, *sizes)
-    return scaled, x  # type: ignore[return-value]  # the same kind
+    return scaled, x
 
 
 def small_cycle(

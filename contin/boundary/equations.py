@@ -1,0 +1,306 @@
+"""Orthogonal collocation at Gauss points on a mesh: the discrete equations, their Jacobian and higher derivatives.
+
+The polynomials satisfy the equation at the d Gauss points of each interval: error O(h^(2 d)) at the mesh points
+(superconvergence, de Boor & Swartz 1973). Integrals use the same Gauss points, so they converge as fast.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.boundary.unknowns import OnMesh
+from contin.collocation.assembly import Bordering, assemble, collocate
+from contin.collocation.defect import Defect
+from contin.collocation.workspace import Workspace, workspace
+from contin.functions.batch import Batch, Columns
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+from contin.linalg.layout import Blocks, Layout, layout
+from contin.linalg.segments import run, share
+
+#: Times, states, states at the other end and parameters at which functions are evaluated.
+_At = tuple[Array, Array, Array, Array]
+
+
+class BoundaryEquations(OnMesh):
+    """F(x) = 0 of a boundary value problem: collocation (scaled by h), boundary and integral conditions, in this order."""
+
+    #: Multipliers in a kernel, of cycles.
+    monodromy: Any = None
+
+    @functools.cached_property
+    def _layout(self) -> Layout:
+        return layout(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
+
+    @property
+    def order_of_states(self) -> Indices:
+        """The states in the order of the columns of a linearized system, shape (n,)."""
+        return self._layout.order
+
+    @functools.cached_property
+    def _columns(self) -> tuple[Columns, Columns]:
+        return self._columns_for(self._free)
+
+    def _columns_for(self, parameters: Indices) -> tuple[Columns, Columns]:
+        """Columns of field, by states in the layout's order, and of boundary; each by these parameters, too."""
+        field, boundary = self.problem.batch("field"), self.problem.batch("boundary")
+        return field.columns(parameters, self._layout.order), boundary.columns(parameters)
+
+    @functools.cached_property
+    def _field(self) -> Batch:
+        """Right-hand side and integrands, compiled."""
+        return self._batch("field", ("states", "integrals"))
+
+    @functools.cached_property
+    def _boundary(self) -> Batch:
+        """Boundary conditions, compiled."""
+        return self._batch("boundary", ("boundary",))
+
+    @functools.cached_property
+    def _functionals(self) -> Batch:
+        """Functionals, with scaled inputs."""
+        return self._batch("functionals")
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """Right-hand side with integrands, and boundary conditions; in the user's units, too."""
+        return self._field, self._boundary, self.problem.batch("field"), self.problem.batch("boundary")
+
+    def _inside(self, x: Array) -> _At:
+        """Return where functions of t are evaluated: at the Gauss points."""
+        return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
+
+    def _inside_unscaled(self, x: Array) -> _At:
+        """Return the same in the user's units."""
+        return self.gauss_times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
+
+    def _at_ends(self, x: Array) -> _At:
+        """Return where boundary conditions are evaluated."""
+        u = self._scaled_states(x)
+        return _TIME, u[:1], u[-1:], self._scaled_parameters(x)
+
+    def _both_ends(self, v: Array) -> Array:
+        """Return the states at both ends side by side, shape (1, 2 n)."""
+        return np.concatenate([v[: self._n], v[self.state_size - self._n : self.state_size]])[None]
+
+    # --- F and F_x -----------------------------------------------------------------------------------------------
+
+    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
+        residual = np.empty(self._conditions)
+        collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
+        return residual
+
+    def residual(self, x: Array) -> Array:
+        """Return the residual of the discrete equations at x, shape (equations,)."""
+        return self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
+
+    def _blocks(
+        self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
+    ) -> tuple[Array, Blocks]:
+        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
+        of_field, of_boundary = self._columns
+        field, jacobian = self._field.jacobian(*self._inside(x), of_field)
+        boundary, ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)
+        blocks = self._empty_blocks(len(rows), len(columns), new)
+        given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
+        run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
+        return self._residual(x, field, boundary), blocks
+
+    def _empty_blocks(self, rows: int, columns: int, new: Callable[[tuple[int, ...]], Array] = np.empty) -> Blocks:
+        """Return blocks for so many rows and columns around F_x."""
+        problem, n, d, k = self.problem, self._n, self._d, len(self.free) + columns
+        r, conditions, width = rows + problem.integral_size, problem.boundary_size, n * (d + 1) + k
+        return Blocks(
+            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k)),
+            np.empty((conditions, n)), np.empty((conditions, n + k)),
+        )  # fmt: skip
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+
+        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
+        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
+        """
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        residual, blocks = self._blocks(x, rows, columns)
+        return residual, Factorization(self._layout, blocks)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
+        n, (of_field, of_boundary) = self._n, self._columns_for(self._indices(names))
+        field = self._field.jacobian(*self._inside(x), of_field)[1][:, :, n:]
+        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0, :, 2 * n :]
+        collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
+        return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,), for w (equations,)."""
+        n, nothing = self._n, (np.empty((0, self.size)), np.empty((0, self.equations)))
+        _, (local, border, corner, first, last) = self._blocks(x, *nothing, np.zeros)
+        layout, collocation = self._layout, self.intervals * self._d * n
+        conditions, inner = collocation + len(first), n * (self._d - 1)
+        by_interval = w[:collocation].reshape(self.intervals, -1)[:, layout.rows]
+        inside = np.einsum("jr,jrc->jc", by_interval, local)
+        inside[:, : inner + 2 * n] += np.einsum("q,jqc->jc", w[conditions:], border[:, :, : inner + 2 * n])
+        result = np.zeros(self.size)
+        at = self._d * n * np.arange(self.intervals)[:, None]
+        np.add.at(result, at + layout.inside, inside[:, :inner])
+        np.add.at(result, at + layout.ends, inside[:, inner : inner + 2 * n])
+        result[:n] += first.T @ w[collocation:conditions]
+        result[self.state_size - n :] += last.T @ w[collocation:conditions]
+        result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
+        return result
+
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of the rows of boundary and integral conditions."""
+        of_field, of_boundary = self._columns
+        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
+        field = self._field.jacobian(*self._inside(x), of_field)[1][:, self._n :]
+        return {"boundary": np.abs(ends).max(axis=1, initial=0.0), "integrals": np.abs(field).max(axis=(0, 2), initial=0.0)}
+
+    # --- further derivatives -------------------------------------------------------------------------------------
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,); the part with u' is linear."""
+        n = self._n
+        field = self._field.along(*self._inside(x), [self._wide(v, self.at_gauss_points(v)) for v in directions])
+        boundary = self._boundary.along(*self._at_ends(x), [self._wide(v, self._both_ends(v)) for v in directions])[0]
+        return np.concatenate([-(self._h_points * field[:, :n]).ravel(), boundary, self.gauss_weights @ field[:, n:]])
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
+        n, inner = self._n, self.gauss_times.size * self._n
+        conditions = inner + self.problem.boundary_size
+        weights = np.empty((self.gauss_times.size, n + self.problem.integral_size))
+        weights[:, :n] = -self._h_points * w[:inner].reshape(-1, n)
+        weights[:, n:] = self.gauss_weights[:, None] * w[conditions : self._conditions]
+        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
+        inside = self._wide(v, self.at_gauss_points(v))
+        result = self._to_nodes(self._field.bent(*self._inside(x), weights, inside, of_field))
+        ends = self._wide(v, self._both_ends(v))
+        at_ends = self._boundary.bent(*self._at_ends(x), w[None, inner:conditions], ends, of_ends)[0]
+        result[:n] += at_ends[:n]
+        result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
+        result[self.state_size :] += at_ends[2 * n :]
+        return result
+
+    def _to_nodes(self, slopes: Array) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
+        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        by_node = np.zeros((self.nodes.size, self._n))
+        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
+        return np.append(by_node.ravel(), slopes[:, self._n :].sum(axis=0))
+
+    # --- functionals ---------------------------------------------------------------------------------------------
+
+    @property
+    def integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are integrals, in the order of the compiled functions."""
+        return tuple(self.problem.functionals)
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals, in their order, by the same quadrature."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        integrals: Array = self.gauss_weights @ self.problem.batch("functionals").values(*self._inside_unscaled(x))
+        return integrals
+
+    def integrands(self, x: Array, times: Array, points: Array) -> Array:
+        """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
+        batch: Batch = self.problem.batch("functionals")
+        return batch.values(times, points * self.scales.states, _NONE(self._n), self.all_parameters(x))
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,); None where they are not known."""
+        if name not in self.integrated:
+            return super().column_gradient(x, name)
+        batch, at = self._functionals, self.integrated.index(name)
+        slopes = batch.jacobian(*self._inside(x), batch.columns(self._free))[1][:, at]
+        return self._to_nodes(self.gauss_weights[:, None] * slopes)
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        if name not in self.integrated:
+            return super().column_bent(x, name, v)
+        batch, weights = self._functionals, np.zeros((self.gauss_times.size, len(self.integrated)))
+        weights[:, self.integrated.index(name)] = self.gauss_weights
+        wide = self._wide(v, self.at_gauss_points(v))
+        return self._to_nodes(batch.bent(*self._inside(x), weights, wide, batch.columns(self._free)))
+
+    # --- errors --------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def defect(self) -> Defect:
+        """What the estimates of errors on this mesh share."""
+        return Defect(self)
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
+        return self.defect.error(x, factors, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return self.defect.left_by_newton(x, self.residual(x), factors)
+
+    def scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        return self._scaled_parameters(x)
+
+    def field_values(self, times: Array, points: Array, p: Array) -> Array:
+        """Return right-hand side and integrands of conditions, shape (K, n + their number).
+
+        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; all are divided by their sizes, as are the values.
+        """
+        return self._field.values(times, points, _NONE(self._n), p)
+
+    # --- in one call of a kernel ---------------------------------------------------------------------------------
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where these are not linear."""
+        return np.empty((0, self.size)), np.empty(0)
+
+    @property
+    def workspace(self) -> Workspace | None:
+        """The arrays in which a kernel corrects points; None where Python evaluates functions, and on very long meshes."""
+        thread = threading.get_ident()
+        if thread not in self._workspaces:  # kernels of two threads run side by side
+            self._workspaces[thread] = self._made_workspace()
+        return self._workspaces[thread]
+
+    @functools.cached_property
+    def _workspaces(self) -> dict[int, Workspace | None]:
+        return {}
+
+    def _made_workspace(self) -> Workspace | None:
+        own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
+        if own is None or not recorded or not 0 <= self.size - self.equations <= 1:
+            return None
+        rows = len(own[0]) + self.size - self.equations
+        numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
+        return workspace(self, rows) if share(self.intervals, numbers).last == 1 else None
+
+    def unfilled_factors(self) -> Factorization:
+        """Return factors of the matrix of `workspace`, to be filled by a kernel."""
+        work = self.workspace
+        assert work is not None
+        return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0))
+
+
+#: The t of boundary conditions, which do not take it.
+_TIME = np.zeros(1)
+
+
+@functools.cache
+def _NONE(n: int) -> Array:
+    """Return the absent second state of a function of one point."""
+    return np.empty((0, n))
