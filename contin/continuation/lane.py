@@ -23,6 +23,7 @@ from contin.continuation.plain_on_mesh import (
     ASK,
     AWAY,
     CALM,
+    CHANGES,
     MAY_BRANCH,
     UNSOUND,
     MeshRooms,
@@ -58,10 +59,11 @@ from contin.core.step import aims
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
-from contin.events.inspection import Start, is_elsewhere
+from contin.events.crossings import changes_little
+from contin.events.inspection import Start, free_of, is_elsewhere
 from contin.events.spectra import spectra_of
 from contin.events.trivial import crossed, jumped
-from contin.linalg.condensation import Factorization
+from contin.linalg.condensation import Factored, Factorization
 from contin.linalg.ends import Relations
 from contin.results.point import Point
 
@@ -69,6 +71,9 @@ from contin.results.point import Point
 FEWEST, MOST = 8, 128
 #: The length of a step, and its end.
 Handed = tuple[float, Trial]
+#: Where the error of the mesh is above its tolerance already, as finer meshes do not lower it, steps whose errors grow by less
+#: than this factor want none. Ten times larger, errors of the mesh would grow unseen up to where the mesh is adapted next.
+_NO_WORSE = 2.0
 
 
 def lane_of(
@@ -169,8 +174,8 @@ class Lane(ABC):
         bent = state.previous_tangent is not None
         path.x[1], path.tangents[1] = state.x, state.tangent
         path.tangents[0] = state.previous_tangent if bent else 0.0
-        path.numbers[1, :MESH_ERROR] = (
-            state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0,
+        path.numbers[1, : MESH_ERROR + 1] = (
+            state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0, state.discretization_error,
         )  # fmt: skip
         self._handed = None
         made = self._make(path, state.accepted, int(bent), here)
@@ -236,9 +241,9 @@ class MeshLane(Lane):
         super().__init__(system, *given)
         settings, newton, n = self.settings, self.settings.newton, system.states_count
         autonomous = system.size_of_solutions is not None
-        self._work, self._factors = system.workspace, system.unfilled_factors()
+        self._work, self._factors = system.workspace, [system.unfilled_factors(), system.unfilled_factors()]
         self._rooms = MeshRooms(
-            self._work, self._factors.room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
+            self._work, self._factors[0].room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
             np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
             self._frame, self._attempt, self._control, self._watch,
         )  # fmt: skip
@@ -266,57 +271,73 @@ class MeshLane(Lane):
 
     def _home(self) -> tuple[Array, Array]:
         home, x, _ = self._start
-        first = x[home.state_size :].copy()
-        if home.scales is not self.system.scales:
-            first[:] = np.nan
-        return first, np.ones(first.size)
+        return free_of(home, x, self.system), np.ones(len(self.system.free))
 
     def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
-        work, factored, newton, report, amplitude, frame, *_ = self._rooms
-        values = work.values
+        values, known = self._work.values, self._begun(path, here)
+        if known is None:
+            return 0
+        now, before, clear = 0, known, self._compared(known.room, 1)
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
+            return 0
+        error = path.numbers[1, MESH_ERROR]
+        poor = max(self._poor, _NO_WORSE * error) if error > self._poor else self._poor
+        for number in range(2, len(path.x)):
+            now, after = 1 - now, self._factors[1 - now]
+            bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
+            step = step_on_mesh(self._rooms._replace(factored=after.room), path, accepted, number, bend)
+            asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
+            if not asks:
+                was, found = clear, MAY_BRANCH
+                clear = self._compared(after.room, 0)
+                if self._monodromy is not None:
+                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
+                asks = found == ASK or not (found == AWAY or self._stays_regular(was, clear, before, after))
+            if not asks:
+                error = estimate(self._work, after.room, self._estimate, path.x[number])
+                path.numbers[number, MESH_ERROR] = error
+                asks = not error <= poor
+            if asks:
+                if step:
+                    self._hand_over(path, number, abs(step), now)
+                return number - 2
+            before = after
+        return len(path.x) - 2
+
+    def _begun(self, path: Path, here: Trial) -> Factorization | None:
+        """Prepare steps from row 1 of a path, the point ``here``; return the factors there, None where they are not found."""
+        _, factored, newton, report, amplitude, frame, *_ = self._rooms
+        values = self._work.values
         conditions, targets = self.system.linear_conditions
         values.rows[: len(targets)], values.targets[: len(targets)] = conditions, targets
         values.rows[-1] = frame.weights * path.tangents[1]
         if amplitude.size:
             amplitude[:] = self.system.amplitude_row
-        begins: Any = factored
         if isinstance(here.factors, Factorization) and np.array_equal(values.at, here.x):
-            begins = here.factors.room
-        else:
-            given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
-            if one_call.correct_on_mesh(work, factored, *given) != one_call.CONVERGED:
-                return 0
-        before, after = self._relations
-        clear = ends_are_calm(begins, before, after, self._quotient, 1) if self._watched else CALM
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
-            return 0
-        for number in range(2, len(path.x)):
-            before, after = after, before
-            bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
-            step = step_on_mesh(self._rooms, path, accepted, number, bend)
-            asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
-            if not asks:
-                was, found = clear, MAY_BRANCH
-                if self._watched:
-                    clear = ends_are_calm(factored, before, after, self._quotient, 0)
-                if self._monodromy is not None:
-                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
-                asks = found == ASK or not (found == AWAY or (was != UNSOUND and clear == CALM))
-            if not asks:
-                error = estimate(work, factored, self._estimate, path.x[number])
-                path.numbers[number, MESH_ERROR] = error
-                asks = not error <= self._poor
-            if asks:
-                if step:
-                    self._hand_over(path, number, abs(step))
-                return number - 2
-        return len(path.x) - 2
+            return here.factors
+        given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
+        done = one_call.correct_on_mesh(self._work, factored, *given)
+        return self._factors[0] if done == one_call.CONVERGED else None
 
-    def _hand_over(self, path: Path, number: int, step: float) -> None:
-        """Keep a step that was made and asks for a closer look, with its factors."""
+    def _compared(self, factored: Factored, begins: int) -> int:
+        """Return what condensed matrices say of a step that ends at a matrix."""
+        if not self._watched:
+            return CALM
+        before, after = self._relations[::-1]
+        self._relations = [before, after]
+        return int(ends_are_calm(factored, before, after, self._quotient, begins))
+
+    def _stays_regular(self, was: int, clear: int, before: Factorization, after: Factorization) -> bool:
+        """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""
+        if was != UNSOUND and clear in (CALM, CHANGES):
+            return clear == CALM
+        return changes_little(before, after, self.system.size)
+
+    def _hand_over(self, path: Path, number: int, step: float, place: int) -> None:
+        """Keep a step that was made and asks for a closer look, with its factors, which stand at a place."""
         sign, iterations, error = self._attempt.judged[[SIGN, UPDATES, ERROR]].tolist()
-        factors, self._factors = self._factors, self.system.unfilled_factors()
-        self._rooms = self._rooms._replace(factored=self._factors.room)
+        factors, self._factors[place] = self._factors[place], self.system.unfilled_factors()
+        self._rooms = self._rooms._replace(factored=self._factors[0].room)
         factors.sign = sign
         linear = Linearization(path.tangents[number].copy(), sign, factors)
         self._handed = step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)

@@ -40,8 +40,9 @@ def _product(row: Array, x: Array) -> float:
 
 #: What multipliers say of a step: look closer; nothing; that a branch point or a fold may lie in it.
 ASK, AWAY, MAY_BRANCH = range(3)
-#: What condensed matrices say.
-UNSOUND, SOUND, CALM = range(3)
+#: What condensed matrices say: nothing; nothing, because relations turn too much or nothing is compared; that no singular
+#: value comes near zero; that one may.
+UNSOUND, SOUND, CALM, CHANGES = range(4)
 
 
 class MeshRooms(NamedTuple):
@@ -121,17 +122,19 @@ def rests(field: Matrix, n: int, still: float) -> int:
 
 @kernel(reorder=False, last=True)
 def ends_are_calm(factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
-    """Fill in what a matrix says of both ends of the mesh; return `CALM` where no singular value comes near zero in a step.
+    """Fill in what a matrix says of both ends of the mesh; return what follows for a step.
 
-    That is from ``before`` on, by the condensed matrices, as in `contin.events.crossings`. Else return whether the one here
-    is `SOUND`, and may be compared, or `UNSOUND`. Where a step ``begins``, nothing is compared.
+    It is `CALM` or `CHANGES` by the condensed matrices from ``before`` on, as in `contin.events.crossings`, if that one was not
+    `UNSOUND`. Where a step ``begins``, nothing is compared.
     """
     factors, _, first, last, carried, _ = factored
     least = relate_ends(factors.chain, carried[0], first, last, after.relations, after.others)
     if begins or not least > PIVOT:
         return SOUND if least > PIVOT else UNSOUND
     turn = divide_ends(before, after, quotient.quotient, quotient.work)
-    return CALM if turn < TURN and calm(quotient) else SOUND
+    if not turn < TURN:
+        return SOUND
+    return CALM if calm(quotient) else CHANGES
 
 
 @kernel(reorder=False, last=True)

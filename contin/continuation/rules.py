@@ -11,7 +11,7 @@ from typing import NamedTuple
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, turned, up_to
 from contin.events.folds import dips, ends_low
-from contin.events.inspection import FEWEST, REACH
+from contin.events.inspection import FEWEST, REACH, misses
 from contin.events.significance import STANDS
 from contin.functions.kernel_parts import IndexVector, Matrix, Vector, helper
 
@@ -157,8 +157,11 @@ def asks(
         for i in range(watch.home.size):
             one += watch.closing[i] * (watch.home[i] - x[begin + i]) ** 2
             other += watch.closing[i] * (watch.home[i] - new[begin + i]) ** 2
-        if not math.sqrt(one) + math.sqrt(other) > REACH * step:
-            now[CLOSES] = 1.0
+        now[CLOSES] = 0.0 if math.sqrt(one) + math.sqrt(other) > REACH * step else 1.0
+        rates, new_rates = path.tangents[number - 1], path.tangents[number]
+        for i in range(frame.states, size):
+            if misses(watch.home[i - begin], x[i], rates[i], new[i], new_rates[i], step):
+                now[CLOSES] = 0.0
     return control.primary >= 0 and _may_turn(attempt, control, path, number, step)
 
 

@@ -263,8 +263,11 @@ def calm(before: Factors, after: Factors, size: int) -> bool:
     if size <= _SMALL and isinstance(before, DenseFactors) and isinstance(after, DenseFactors):
         return _is_near_one(after.solve(before.matrix.T))
     condensed = _condensed(before, after)
-    if condensed is not None:
-        return _is_near_one(condensed)
+    return changes_little(before, after, size) if condensed is None else _is_near_one(condensed)
+
+
+def changes_little(before: Factors, after: Factors, size: int) -> bool:
+    """Return the same by the directions in which the inverses differ most, where nothing condensed decides."""
     if size <= _SMALL:
         return _is_calm(_all(before, after, size))
     watch = _Watch(before, after, size)

@@ -26,6 +26,7 @@ from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
 from contin.events.trivial import crossed, round_off
 from contin.events.zeros import separated
+from contin.functions.kernel_parts import helper
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already.
@@ -65,6 +66,9 @@ _SAME_WAY = 0.5
 _BACK = 0.1
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 REACH = 2
+#: Errors of a parameter at the first point of a run, relative to 1 + its size. A thousand times larger, steps that pass near
+#: the value of the first point in every parameter are looked at.
+_VALUE = 1e-6
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
 _SAME, _SAME_SHARE = 1e-4, 2e-3
 #: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
@@ -391,13 +395,30 @@ def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool
     Without this each step would carry the first point to its mesh and bring it in phase.
     """
     system, (home, x, _) = trial.system, start
+    first, size = free_of(home, x, system).tolist(), system.state_size
+    ends = [end.x[size:].tolist() for end in (before, trial)]
+    if sum(math.dist(first, end) for end in ends) > REACH * step:
+        return True  # the free parameters are
+    rates = [end.tangent[size:].tolist() for end in (before, trial)]
+    if any(misses(value, a, t, b, u, step) for value, a, t, b, u in zip(first, ends[0], rates[0], ends[1], rates[1])):
+        return True
     if home.scales is not system.scales:
         return False
-    first, size = x[home.state_size :].tolist(), system.state_size
-    if sum(math.dist(first, end.x[size:].tolist()) for end in (before, trial)) > REACH * step:
-        return True  # the free parameters are
-    kept, ends = home.lasting(x), (system.lasting(end.x) for end in (before, trial))
-    return sum(math.dist(kept, end) for end in ends) > REACH * step
+    kept = home.lasting(x)
+    return sum(math.dist(kept, system.lasting(end.x)) for end in (before, trial)) > REACH * step
+
+
+def free_of(home: Discretization, x: Array, system: Discretization) -> Array:
+    """Return the free parameters of one system in the units of another."""
+    found: Array = x[home.state_size :] * (home.free_scales / system.free_scales)
+    return found
+
+
+@helper
+def misses(value: float, first: float, rate: float, last: float, last_rate: float, step: float) -> bool:
+    """Return whether a parameter certainly does not take a value in a step, by its values and rates at both ends."""
+    margin = step * max(abs(rate), abs(last_rate)) + _VALUE * (1 + abs(value))
+    return value < min(first, last) - margin or value > max(first, last) + margin
 
 
 def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
