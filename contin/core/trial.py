@@ -141,8 +141,10 @@ class Trial:
     @property
     def discretization_error(self) -> float:
         """Estimated error that is due to the mesh, relative to 1 + size; computed with Newton's factors when asked for."""
+        if not self.system.intervals:
+            return 0.0
         if self._discretization_error is None:
-            if self.factors is None and self.system.intervals:
+            if self.factors is None:
                 self.refactor(self.system.weights * self.tangent)
             self._discretization_error = self.system.discretization_error(self.x, self.factors, self.functionals)
         return self._discretization_error

@@ -409,8 +409,9 @@ def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool
 
 
 def free_of(home: Discretization, x: Array, system: Discretization) -> Array:
-    """Return the free parameters of one system in the units of another."""
-    found: Array = x[home.state_size :] * (home.free_scales / system.free_scales)
+    """Return the unknowns of one system that are no states, in the units of another."""
+    found: Array = x[home.state_size :].copy()
+    found[: len(home.free)] *= home.free_scales / system.free_scales
     return found
 
 
