@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -50,6 +50,7 @@ class CriticalCurve(Defining):
 
     #: That of the coefficient of the normal form, and others.
     own_columns: tuple[str, ...] = ("normal_form",)
+    _coefficient: tuple[bytes, Coefficient] | None = None
 
     def kappa(self, x: Array) -> float:
         """Return the real number through which the equations contain the complex pair; 0 where there is none."""
@@ -132,16 +133,21 @@ class CriticalCurve(Defining):
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the coefficient of the normal form."""
-        return np.append(super().functionals(x), self.normal_form(x).value)
+        return np.append(super().functionals(x), self.coefficient_at(x).value)
+
+    def coefficient_at(self, x: Array) -> Coefficient:
+        """Return `normal_form`, computed once."""
+        key = x.tobytes()
+        if self._coefficient is None or self._coefficient[0] != key:
+            self._coefficient = key, self.normal_form(x)
+        return self._coefficient[1]
 
 
 def degenerate(label: str, name: str) -> Event:
     """Return the test function of points where the coefficient of the normal form is zero."""
 
     def coefficient(trial: Trial) -> Coefficient:
-        curve: Any = trial.system
-        found: Coefficient = curve.normal_form(trial.x)
-        return found
+        return cast(CriticalCurve, trial.system).coefficient_at(trial.x)
 
     return Event(label, name, lambda trial: coefficient(trial).signed, confirm=lambda trial: coefficient(trial).vanishes)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,21 +21,30 @@ _DRAWS, _SEED = 2, 5
 #: doubling in a conservative system, changes by less than a tenth of its value once in 20 draws. Ten times larger, errors are
 #: ten times as large.
 _CERTAIN = 10.0
+#: A value above this part of its terms, with terms below this size, is no error: that is not estimated. Where a coefficient
+#: is infinite, its terms are 1e8 and more.
+_CLEAR, _MODERATE = 1e-3, 1e6
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.
 _CANCELLED, _ZERO = 1e-6, 1e-9
 
 
-class Coefficient(NamedTuple):
+@dataclass(frozen=True)
+class Coefficient:
     """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms.
 
-    The bifurcation is supercritical where ``side * value`` is negative.
+    The bifurcation is supercritical where ``side * value`` is negative. ``estimate`` returns the error, when that is asked for.
     """
 
     value: float
-    error: float
     size: float
+    estimate: Callable[[], float]
     side: int = 1
+
+    @functools.cached_property
+    def error(self) -> float:
+        """The estimated error."""
+        return self.estimate()
 
     @classmethod
     def of(cls, terms: Callable[[Array], Array], x: Array, system: Any) -> Coefficient:
@@ -42,22 +53,27 @@ class Coefficient(NamedTuple):
         The relative error of the derivatives of ``system`` is part of the error, and so is what an error of x
         changes. At centres of conservative systems the coefficient is zero, and not larger than its error.
         """
-        random, points = np.random.default_rng(_SEED), [x]
-        for _ in range(_DRAWS):
-            points.append(x + _MOVED * (1 + np.abs(x)) * random.choice((-1.0, 1.0), x.size))
-        (best, *others), error = system.with_derivative_error(lambda: [terms(point) for point in points])
-        size, change = float(np.abs(best).sum()), max(abs(float(best.sum() - other.sum())) for other in others)
-        return cls(float(best.sum()), _CERTAIN * change + error * size, size)
+        best, of_derivatives = system.with_derivative_error(lambda: terms(x))
+        value, size = float(best.sum()), float(np.abs(best).sum())
 
-    @property
-    def is_meaningless(self) -> bool:
-        """The error is as large as the terms, and not just round-off of terms that are zero."""
-        return not (self.error < self.size or self.error < _ZERO)
+        def estimate() -> float:
+            random, changes = np.random.default_rng(_SEED), []
+            for _ in range(_DRAWS):
+                moved = x + _MOVED * (1 + np.abs(x)) * random.choice((-1.0, 1.0), x.size)
+                changes.append(abs(value - float(terms(moved).sum())))
+            return float(_CERTAIN * max(changes) + of_derivatives * size)
+
+        return cls(value, size, estimate)
+
+    def is_meaningless(self, error: float) -> bool:
+        """Return whether an error is as large as the terms, and not just round-off of terms that are zero."""
+        return not (error < self.size or error < _ZERO)
 
     @property
     def signed(self) -> float:
         """The value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations."""
-        return 0.0 if abs(self.value) <= self.error else self.value
+        certain = abs(self.value) > _CLEAR * self.size and self.size < _MODERATE
+        return self.value if certain or not abs(self.value) <= self.error else 0.0
 
     @property
     def vanishes(self) -> bool:
@@ -69,4 +85,4 @@ class Coefficient(NamedTuple):
 
 
 #: Where nothing is known: at the ends of curves, and where it is infinite.
-UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
+UNKNOWN = Coefficient(math.nan, math.nan, lambda: math.nan)

@@ -20,6 +20,7 @@ vanishes at a cusp.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -215,12 +216,16 @@ def _terms(form: Form, rate: complex, w: Any, terms: tuple[Any, ...], factor: in
 
 def coefficient(system: System, x: Array, terms: Callable[..., Array], *frequency: float) -> Coefficient:
     """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite."""
-    with np.errstate(all="ignore"):
-        here = system.form(x)
-        found = Coefficient.of(lambda point: terms(here if point is x else system.form(point), *frequency), x, system)
+
+    def there(point: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return terms(here if point is x else system.form(point), *frequency)
+
+    here = system.form(x)
+    found = Coefficient.of(there, x, system)
     if terms is fold:
-        return Coefficient(abs(found.value), found.error, found.size)
-    return found._replace(side=here.doubled_side) if terms is flip else found
+        return dataclasses.replace(found, value=abs(found.value))
+    return dataclasses.replace(found, side=here.doubled_side) if terms is flip else found
 
 
 def at_special_point(system: System, point: SpecialPoint) -> Coefficient | None:

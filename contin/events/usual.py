@@ -75,8 +75,8 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
     The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run. A coefficient that
     is nothing but error is left out, and its error is stated.
     """
-    found = found._replace(error=found.error + abs(found.value - coarse.value))
-    value, error = ({} if found.is_meaningless else {"normal_form": found.value}), found.error
+    error = found.error + abs(found.value - coarse.value)
+    value = {} if found.is_meaningless(error) else {"normal_form": found.value}
     details = {**(point.details or {}), **value, "normal_form_error": error}
     attracts, repels = found.side * found.value < -error, found.side * found.value > error
     kind = ", supercritical" if attracts else ", subcritical" if repels else ""
