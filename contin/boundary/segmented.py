@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function
+from contin.arrays import Array, Function, Named
 from contin.boundary.statement import BoundaryValueProblem
 from contin.errors import ProblemError
 from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
@@ -162,7 +162,7 @@ class SegmentedProblem(BoundaryValueProblem):
         begin = float(piece.begin(values))
         return begin, begin + float(piece.length(values))
 
-    def whole_guess(self, guess: Any, parameters: Mapping[str, float]) -> Any:
+    def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
 
         Raises
@@ -226,10 +226,7 @@ def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tup
 def _behind(piece: Piece) -> Function:
     """Return the end of a segment as a function of p."""
 
-    def begin(p: Any) -> Any:
-        return piece.begin(p) + piece.length(p)
-
-    return begin
+    return lambda p: piece.begin(p) + piece.length(p)
 
 
 def _check_function(what: str, function: Function, signature: Signature, count: int) -> None:
@@ -250,7 +247,7 @@ def _names(pieces: Sequence[Piece]) -> tuple[str, ...]:
 # --- functions of all states ----------------------------------------------------------------------------------------------
 
 
-def _states(pieces: Sequence[Piece], u: Sequence[Any]) -> list[Any]:
+def _states(pieces: Sequence[Piece], u: Named) -> list[Any]:
     """Return the states of each segment as a named tuple."""
     return [named_values(piece.names)(*list(u)[piece.at]) for piece in pieces]
 
@@ -258,7 +255,7 @@ def _states(pieces: Sequence[Piece], u: Sequence[Any]) -> list[Any]:
 def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
     """Return the right-hand side of all states on [0, 1]."""
 
-    def rhs(t: Any, u: Any, p: Any) -> Any:
+    def rhs(t: float, u: Named, p: Named) -> Any:
         values: list[Any] = []
         for function, piece, own in zip(functions, pieces, _states(pieces, u)):
             length = piece.length(p)
@@ -271,10 +268,7 @@ def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Fun
 def _between(boundary: Function, pieces: Sequence[Piece]) -> Function:
     """Return the conditions as a function of all states at both ends."""
 
-    def conditions(a: Any, b: Any, p: Any) -> Any:
-        return boundary(tuple(_states(pieces, a)), tuple(_states(pieces, b)), p)
-
-    return conditions
+    return lambda a, b, p: boundary(tuple(_states(pieces, a)), tuple(_states(pieces, b)), p)
 
 
 def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Function]:
@@ -284,7 +278,7 @@ def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Fun
 
 
 def _sum(name: str, segments: Sequence[Segment], pieces: Sequence[Piece]) -> Function:
-    def functional(t: Any, u: Any, p: Any) -> Any:
+    def functional(t: float, u: Named, p: Named) -> Any:
         total = 0.0
         for segment, piece, own in zip(segments, pieces, _states(pieces, u)):
             if name in segment.functionals:

@@ -105,7 +105,7 @@ class BoundaryValueProblem(Restated):
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
         return Collocation(self, mesh, degree, free, parameters, scales)
 
-    def whole_guess(self, guess: Any, parameters: Mapping[str, float]) -> Any:
+    def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states for one that a user gives."""
         return guess
 

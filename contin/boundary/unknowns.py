@@ -159,11 +159,11 @@ class OnMesh(System):
         """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
         return self
 
-    def _with(self, **changes: Any) -> Self:
+    def _with(self, **changes: object) -> Self:
         """Return the same with other free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))
-        kept = {"free": self.free, "parameters": values, "scales": self.scales}
-        return type(self)(self.problem, self.mesh, self.degree, **{**kept, **changes})
+        given: dict[str, Any] = {"free": self.free, "parameters": values, "scales": self.scales, **changes}
+        return type(self)(self.problem, self.mesh, self.degree, **given)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the same problem with other values of parameters that are not free."""

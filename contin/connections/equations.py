@@ -14,9 +14,11 @@ from contin.collocation.mesh import MeshControl
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
+from contin.core.system import System
 from contin.errors import ConvergenceError
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
+from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
@@ -67,11 +69,11 @@ class ConnectionEquations(Conditioned):
     plain = False
 
     def __init__(
-        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        self, problem: Statement, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        check_windings(problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
+        check_windings(self.problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
         self.reference: Array = np.empty(0)
 
     def _take_mesh(self, mesh: Array) -> None:
@@ -421,7 +423,7 @@ class ConnectionEquations(Conditioned):
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
-    def _with(self, **changes: Any) -> Self:
+    def _with(self, **changes: object) -> Self:
         other = super()._with(**changes)
         return other.with_reference(self._carried(other)) if self.reference.size else other
 
@@ -430,12 +432,11 @@ class ConnectionEquations(Conditioned):
         other, carry = super().on_mesh(mesh)
         return other.with_reference(carry(self.reference)) if self.reference.size else other, carry
 
-    def _carried(self, other: Any) -> Array:
+    def _carried(self, other: System) -> Array:
         """Return the reference as a vector of unknowns of another system of this problem."""
         states = self.states(self.reference)
         names = list(self.problem.parameters)
-        carried: Array = other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
-        return carried
+        return other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""

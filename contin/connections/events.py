@@ -33,6 +33,7 @@ from contin.arrays import Array, ComplexArray
 from contin.connections.equations import ConnectionEquations
 from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
+from contin.events.error import Solution
 from contin.linalg.orientation import oriented
 
 #: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
@@ -129,13 +130,13 @@ def _second_zero(side: int) -> Event:
     return Event("BT", "Bogdanov-Takens: the saddle-node has two eigenvalues zero", total, terminal=True)
 
 
-def crossing(point: Any) -> tuple[bool, int]:
+def crossing(point: Solution) -> tuple[bool, int]:
     """Return, for a point labelled NCH, whether the orbit is then one to a saddle, and the end or side that it is about.
 
     Of an orbit to a saddle-node, the end that is non-central; of one to a saddle, the side of the eigenvalue that is zero.
     """
     trial = Trial.without_tangent(point.system, point.x)
-    if point.system.problem.saddle_node:
+    if _system(trial).problem.saddle_node:
         return False, int(np.argmin([abs(test.function(trial)) for test in _NON_CENTRAL]))
     return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
 

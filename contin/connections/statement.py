@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from contin import checks
-from contin.arrays import Function, Places
+from contin.arrays import Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
 from contin.connections.system import ConnectionCollocation
 from contin.core.scales import Scales
@@ -161,7 +161,7 @@ def _at_rest(field: Function, names: Sequence[str], homoclinic: bool) -> Functio
     state: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
     kinds = ("from_",) if homoclinic else ("from_", "to_")
 
-    def boundary(a: Any, b: Any, p: Any) -> Any:
+    def boundary(a: Named, b: Named, p: Named) -> Any:
         return [rate for kind in kinds for rate in field(state(*(getattr(p, kind + name) for name in names)), p)]
 
     return boundary

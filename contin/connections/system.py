@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from contin.arrays import Array
@@ -13,6 +11,7 @@ from contin.core.trial import Event, Trial
 from contin.defining.event_curve import EventCurve
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
+from contin.events.error import Solution
 from contin.problems.own_names import TIME
 
 #: Equilibria that are nearer to each other than this part of the orbit's size are one.
@@ -45,7 +44,7 @@ class ConnectionCollocation(ConnectionEquations):
                 f"give a guess of the last equilibrium ({', '.join(names[count:])})"
             )
 
-    def defining(self, point: Any, x: Array) -> tuple[EventCurve, Array] | None:
+    def defining(self, point: Solution, x: Array) -> tuple[EventCurve, Array] | None:
         """Return that of special homoclinic orbits."""
         test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
         return None if test is None else (EventCurve(self, test), x)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.functions.batch import Batch
 
 #: An angle's number of rounds is a parameter with this and the name of the angle for a name.
 WINDING = "winding_"
@@ -23,7 +24,15 @@ _PLACES, _SEED = 5, 11
 Angles = Sequence[str] | Mapping[str, float]
 
 
-def angle_periods(angles: Any, states: Sequence[str]) -> dict[str, float]:
+class Angular(Protocol):
+    """A statement of which the angles are asked, if it has any."""
+
+    @property
+    def states(self) -> Any:
+        """Names of the states."""
+
+
+def angle_periods(angles: Angles, states: Sequence[str]) -> dict[str, float]:
     """Return the period of each angle by its name.
 
     Raises
@@ -46,9 +55,9 @@ def angle_periods(angles: Any, states: Sequence[str]) -> dict[str, float]:
     return {name: float(angles[name]) for name in states if name in angles}
 
 
-def periods_of(problem: Any) -> Array:
+def periods_of(problem: Angular) -> Array:
     """Return the period of each state that is an angle and zero for the others, shape (n,)."""
-    angles = getattr(problem, "angles", {})
+    angles: Mapping[str, float] = getattr(problem, "angles", {})
     return np.array([angles.get(name, 0.0) for name in problem.states])
 
 
@@ -88,7 +97,7 @@ def check_windings(angles: Mapping[str, float], free: Sequence[str], parameters:
 
 
 def check_periodic(
-    what: str, batch: Any, angles: Mapping[str, float], parameters: Mapping[str, float], lifts: bool = False
+    what: str, batch: Batch, angles: Mapping[str, float], parameters: Mapping[str, float], lifts: bool = False
 ) -> None:
     """Check at some places that a function of the states is periodic in each angle; where it has no value nothing is checked.
 

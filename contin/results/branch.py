@@ -12,6 +12,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.core.state import Stop
 from contin.results import plot, table
+from contin.results.axes import Axes
 from contin.results.point import Point
 
 #: Labels that the text of a branch shows: a screen is not filled by a snaking branch of a hundred folds.
@@ -62,7 +63,7 @@ class Branch:
     @overload
     def __getitem__(self, which: str) -> Array: ...
 
-    def __getitem__(self, which: Any) -> Any:
+    def __getitem__(self, which: int | slice | str) -> Any:
         """Return a point by its number, points by a slice, or a column by its name (`column`).
 
         Examples
@@ -128,7 +129,7 @@ class Branch:
         return table.to_pandas(self.points)
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 
         Of cycles and equilibria, and where the index is known (`VariationalProblem`), stable parts are solid and unstable ones

@@ -12,7 +12,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
-from contin.results.axes import new_axes
+from contin.results.axes import Axes, new_axes
 from contin.results.point import Point
 
 #: Marks of labelled points: matplotlib's symbol and colour (Okabe-Ito: told apart by the colour-blind).
@@ -33,7 +33,7 @@ _VISIBLE = 1e-3
 _AREA = {"*": 90, "": 30}
 
 
-def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
     """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
@@ -49,7 +49,7 @@ def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, ax
 
 def _draw(
     points: Sequence[Point], names: tuple[str, str], pieces: Sequence[tuple[bool | None, slice]], known: set[str | None],
-    axes: Any,
+    axes: Axes,
 ) -> set[str | None]:  # fmt: skip
     """Draw one column over another, and return the names for the legend; those that are ``known`` are not given again."""
     across, up = column(points, names[0]), column(points, names[1])

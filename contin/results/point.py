@@ -20,6 +20,7 @@ from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
+from contin.results.axes import Axes
 from contin.results.profile import Profile
 from contin.results.record import Record
 from contin.results.sensitivity import sensitivities
@@ -144,7 +145,7 @@ class Point(Record):
         return tuple(kind for kind in curve.base.leaving.get(self.label, ()) if kind != own)
 
     @checks.arguments
-    def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
+    def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Axes | Array | None = None) -> Any:
         """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
 
         Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from contin.cycles.floquet import floquet
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
 from contin.problems.statement import declared
-from contin.results.axes import new_axes
+from contin.results.axes import Axes, new_axes
 from contin.results.profile import Profile
 from contin.results.record import Record, over_t
 
@@ -30,7 +30,7 @@ _MOST_RINGS = 6
 _OVER_T = "plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem"
 
 
-def plot(point: Record, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
+def plot(point: Record, what: str | None, states: Sequence[str] | None, axes: Axes | Array | None) -> Any:
     """Draw one point; see `contin.Point.plot`."""
     system = over_t(point, _OVER_T)
     drawings = _drawings(system)
@@ -39,11 +39,11 @@ def plot(point: Record, what: str | None, states: Sequence[str] | None, axes: An
     names = _chosen(system, states)
     if what is not None:
         axes = new_axes() if axes is None else axes
-        drawings[what](point, names, axes)
+        drawings[what](point, names, cast(Axes, axes))
         return axes
     if axes is None:
         axes = new_axes(len(drawings))
-    given = list(np.ravel(axes))
+    given = list(np.ravel(np.asarray(axes, dtype=object)))
     if len(given) != len(drawings):
         raise ProblemError(f"axes: {len(given)} given, must be {len(drawings)}, or one with what = {', '.join(drawings)}")
     for draw, panel in zip(drawings.values(), given):
@@ -51,9 +51,9 @@ def plot(point: Record, what: str | None, states: Sequence[str] | None, axes: An
     return axes
 
 
-def _drawings(system: Collocation) -> dict[str, Callable[[Record, tuple[str, ...], Any], None]]:
+def _drawings(system: Collocation) -> dict[str, Callable[[Record, tuple[str, ...], Axes], None]]:
     """Return the pictures that there are of a point, by name."""
-    found: dict[str, Callable[[Record, tuple[str, ...], Any], None]] = {}
+    found: dict[str, Callable[[Record, tuple[str, ...], Axes], None]] = {}
     if len(_known(system)) > 1:
         found["portrait"] = _portrait
     found["series"] = _series
@@ -121,7 +121,7 @@ def _on_circles(t: Array, states: Array, periods: Array) -> tuple[Array, Array]:
     return np.insert(t, after + 1, t[after]), np.insert(states, after + 1, gaps, axis=0)
 
 
-def _portrait(point: Record, names: tuple[str, ...], axes: Any) -> None:
+def _portrait(point: Record, names: tuple[str, ...], axes: Axes) -> None:
     """Draw the second state against the first, with an arrow in the sense of time; segments in colours of their own."""
     courses = _courses(point, names[:2])
     for index, (_, states) in enumerate(courses):
@@ -140,7 +140,7 @@ def _portrait(point: Record, names: tuple[str, ...], axes: Any) -> None:
     axes.set(xlabel=names[0], ylabel=names[1])
 
 
-def _series(point: Record, names: tuple[str, ...], axes: Any) -> None:
+def _series(point: Record, names: tuple[str, ...], axes: Axes) -> None:
     """Draw the states over time; where segments meet there is a line."""
     names = names[:_MOST_STATES]
     courses = _courses(point, names)
@@ -157,7 +157,7 @@ def _series(point: Record, names: tuple[str, ...], axes: Any) -> None:
         axes.set(ylabel=names[0])
 
 
-def _multipliers(point: Record, names: tuple[str, ...], axes: Any) -> None:
+def _multipliers(point: Record, names: tuple[str, ...], axes: Axes) -> None:
     """Draw the Floquet multipliers and the unit circle; outside of it distances from 0 are 1 + log10 |multiplier|."""
     found = floquet(point.system, point.x, point.tangent)
     size = found.logarithms.real

@@ -114,7 +114,7 @@ def _said(statement: dict[str, Any]) -> str:
     return f"{kind}(states {checks.listed(statement['states'])}; parameters {checks.listed(statement['names'])}{symmetry})"
 
 
-def _arrays_of(system: Any, number: int) -> dict[str, Array]:
+def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
     """Return what is stored of a discretized problem.
 
     Raises
@@ -122,8 +122,8 @@ def _arrays_of(system: Any, number: int) -> dict[str, Array]:
     ProblemError
         It is of a kind that is not stored.
     """
-    base = system.base if system.on_curve else system
-    if system.on_curve and system.kind not in _curves(base):
+    base = system.solution
+    if system.on_curve and getattr(system, "kind", "") not in _curves(base):
         raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")
     arrays: dict[str, Array] | None = base.stored
     if arrays is None:
@@ -136,7 +136,7 @@ def _curves(base: Discretization) -> dict[str, Any]:
     return {**{kind.kind: kind for kind in (FoldCurve, BranchPointCurve)}, **base.curves}
 
 
-def _numbers(details: Any) -> dict[str, float] | None:
+def _numbers(details: object) -> dict[str, float] | None:
     """Return details that are a dictionary of numbers, None for others: a user's test function may describe anything."""
     if not isinstance(details, dict) or not all(map(checks.is_number, details.values())):
         return None

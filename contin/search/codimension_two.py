@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, ComplexArray
 from contin.core.newton import correct
 from contin.core.protocol import Discretization
 from contin.core.trial import linearization
@@ -124,7 +124,7 @@ def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float |
     raise ConvergenceError("no curve of cycles was found beside the point of codimension two")
 
 
-def _angle(exponents: Any, expected: float) -> float:
+def _angle(exponents: ComplexArray, expected: float) -> float:
     """Return the angle of the complex pair of multipliers that is nearest to an expected one on the unit circle.
 
     Raises

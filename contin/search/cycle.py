@@ -95,7 +95,11 @@ def _numbers(start: Sequence[float], count: int) -> Array:
     return array
 
 
-def _vector_field(problem: CycleProblem, values: Any) -> Any:
+#: The field as an integrator calls it, f(t, u).
+Field = Callable[[float, Array], Any]
+
+
+def _vector_field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
     """Return the field as an integrator of SciPy calls it."""
     of_state: Any = namedtuple("U", problem.state_names)  # type: ignore[misc]  # noqa: PYI024
     of_parameters: Any = namedtuple("P", tuple(values))  # type: ignore[misc]  # noqa: PYI024
@@ -105,7 +109,7 @@ def _vector_field(problem: CycleProblem, values: Any) -> Any:
     return lambda t, u: field(t, of_state(*u), p)
 
 
-def _integrated(field: Any, start: Array, time: float, tolerance: float, **options: Any) -> Any:
+def _integrated(field: Field, start: Array, time: float, tolerance: float, dense: bool = False) -> Any:
     from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # .3 s; only this needs it
 
     far = _FAR * (1 + np.abs(start).max(initial=0.0))
@@ -114,13 +118,14 @@ def _integrated(field: Any, start: Array, time: float, tolerance: float, **optio
         return float(far - np.abs(u).max(initial=0.0))
 
     escapes.terminal = True  # type: ignore[attr-defined]  # as SciPy takes it
-    done = solve_ivp(field, (0.0, time), start, method="LSODA", rtol=tolerance, atol=tolerance, events=escapes, **options)
+    options = {"method": "LSODA", "rtol": tolerance, "atol": tolerance, "events": escapes, "dense_output": dense}
+    done = solve_ivp(field, (0.0, time), start, **options)
     if done.status or not np.isfinite(done.y).all():
         raise ProblemError(f"start: the motion from there has no finite value after t = {done.t[-1]:.6g}")
     return done
 
 
-def _passages(times: Array, height: Callable[[Any], Any]) -> Iterator[float]:
+def _passages(times: Array, height: Callable[[Array], Array]) -> Iterator[float]:
     """Yield the times between given ones at which a height passes zero upwards. SciPy's events fail at ends of its steps."""
     from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
 
@@ -130,18 +135,18 @@ def _passages(times: Array, height: Callable[[Any], Any]) -> Iterator[float]:
         yield float(brentq(height, times[i], times[i + 1]))
 
 
-def _looks(done: Any, periods: Array) -> Array:
-    """Return the steps of a motion, divided where an angle goes round by more than a part of its period."""
-    advance = np.abs(np.diff(done.y, axis=1)) / np.where(periods > 0, periods, np.inf)[:, None]
+def _looks(times: Array, states: Array, periods: Array) -> Array:
+    """Return the steps (K,) of a motion (n, K), divided where an angle goes round by more than a part of its period."""
+    advance = np.abs(np.diff(states, axis=1)) / np.where(periods > 0, periods, np.inf)[:, None]
     pieces = np.ceil(_PER_ROUND * advance.max(axis=0)).astype(int).clip(1)
-    starts = np.repeat(done.t[:-1], pieces)
+    starts = np.repeat(times[:-1], pieces)
     within = np.concatenate([np.arange(count) / count for count in pieces])
-    found: Array = np.append(starts + within * np.repeat(np.diff(done.t), pieces), done.t[-1])
+    found: Array = np.append(starts + within * np.repeat(np.diff(times), pieces), times[-1])
     return found
 
 
 def _forced_rounds(
-    problem: CycleProblem, field: Any, start: tuple[Array, float], values: Any
+    problem: CycleProblem, field: Field, start: tuple[Array, float], values: Mapping[str, float]
 ) -> tuple[tuple[Array, Array], int]:
     """Return times (K,), from 0, and states (K, n) of a forced motion that has settled, and after how many periods it closes.
 
@@ -153,7 +158,7 @@ def _forced_rounds(
     """
     period = problem.duration({**values, ROUNDS: 1.0})
     settled = _integrated(field, start[0], period * math.ceil(start[1] / period), _SETTLES).y[:, -1]
-    done = _integrated(field, settled, period * _MOST_ROUNDS, _ACCURATE, dense_output=True)
+    done = _integrated(field, settled, period * _MOST_ROUNDS, _ACCURATE, dense=True)
     periods = periods_of(problem)
     size = _size(done.y, periods) or 1.0
     for rounds in range(1, _MOST_ROUNDS + 1):
@@ -178,7 +183,7 @@ def _apart(states: Array, start: Array, periods: Array) -> Array:
     return found
 
 
-def _one_round(field: Any, start: Array, longest: float, periods: Array) -> tuple[Array, Array]:
+def _one_round(field: Field, start: Array, longest: float, periods: Array) -> tuple[Array, Array]:
     """Return times (K,), from 0, and states (K, n) of one round of a motion that has settled.
 
     A round ends where the motion comes back through the plane normal to it at its start, close to the start; angles come back
@@ -190,14 +195,14 @@ def _one_round(field: Any, start: Array, longest: float, periods: Array) -> tupl
     """
     across = np.asarray(field(0.0, start), dtype=float)
     for part in _PARTS:
-        done = _integrated(field, start, part * longest, _ACCURATE, dense_output=True)
+        done = _integrated(field, start, part * longest, _ACCURATE, dense=True)
         size = _size(done.y, periods)
         rests = size <= _RESTS * (1 + np.abs(start).max())
 
-        def height(t: Any, sol: Any = done.sol) -> Any:
+        def height(t: Array, sol: Callable[[Array], Array] = done.sol) -> Array:
             return across @ _apart(sol(t).T, start, periods).T
 
-        for t in () if rests else _passages(_looks(done, periods), height):
+        for t in () if rests else _passages(_looks(done.t, done.y, periods), height):
             if np.abs(_apart(done.sol(t), start, periods)).max() <= _BACK * size:
                 times = np.linspace(0.0, t, _SAMPLES)
                 return times, done.sol(times).T

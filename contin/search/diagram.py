@@ -24,6 +24,7 @@ from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import declared
 from contin.results import plot
+from contin.results.axes import Axes
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.results.record import system_of
@@ -77,7 +78,7 @@ class Diagram:
         return "\n".join([head, *lines])
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
         """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
 
         Parameters
@@ -328,7 +329,7 @@ class _Explorer:
             yield which, int(np.sign(cosines[which]) or 1)
 
 
-def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
+def _image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
     """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
     states = system.states(x).copy()
     visible = states[:, : declared(system.problem, "dimension")]
@@ -336,9 +337,9 @@ def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
     return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
 
 
-def _seen(system: Any, x: Array) -> Array:
+def _seen(system: Discretization, x: Array) -> Array:
     """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
-    problem = system.problem
+    problem: Any = system.problem
     if declared(problem, "dimension") == len(problem.states):
         return x
     x = x.copy()
@@ -402,9 +403,9 @@ def diagram(
     return _Explorer(settings, symmetries, tolerance, Progress(progress)).run(system, x, depth)
 
 
-def _check_columns(system: Any, settings: Settings) -> None:
+def _check_columns(system: Discretization, settings: Settings) -> None:
     """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
-    problem = system.problem
+    problem: Any = system.problem
     known = [*problem.parameters, *problem.functionals]
     known += [name for name in system.named_states if name not in known]
     if system.starts_cycles and not system.is_cycle:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -82,7 +81,9 @@ def from_auto(
     return _located(system, x, solution)
 
 
-def _values(problem: Any, solution: AutoSolution, given: Mapping[str, float]) -> dict[str, float]:
+def _values(
+    problem: BoundaryValueProblem | AlgebraicProblem, solution: AutoSolution, given: Mapping[str, float]
+) -> dict[str, float]:
     """Return the values of all parameters of a problem.
 
     Raises
@@ -104,7 +105,9 @@ def _values(problem: Any, solution: AutoSolution, given: Mapping[str, float]) ->
     return {name: known[name] for name in problem.parameters}
 
 
-def _system(problem: Any, solution: AutoSolution, free: Sequence[str], values: Mapping[str, float]) -> tuple[System, Array]:
+def _system(
+    problem: BoundaryValueProblem | AlgebraicProblem, solution: AutoSolution, free: Sequence[str], values: Mapping[str, float]
+) -> tuple[System, Array]:
     """Return the discretized problem on AUTO's mesh, and the solution as its unknowns."""
     if problem.domain is None:
         algebraic = Algebraic(problem, free, values)

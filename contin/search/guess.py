@@ -39,7 +39,7 @@ class Options:
     degree: int
 
 
-def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, Array]:
+def first_guess(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, options: Options) -> tuple[System, Array]:
     """Return the discretized problem and a vector of unknowns for a guess.
 
     Raises
@@ -47,10 +47,12 @@ def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, A
     ProblemError
         A guess that does not fit.
     """
-    return (_without_mesh if problem.domain is None else _on_mesh)(problem, guess, options)
+    if isinstance(problem, AlgebraicProblem):
+        return _without_mesh(problem, guess, options)
+    return _on_mesh(problem, guess, options)
 
 
-def _without_mesh(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
+def _without_mesh(problem: AlgebraicProblem, guess: Guess, options: Options) -> tuple[System, Array]:
     system = problem.discretized(options.free, options.parameters)
     given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
     count = len(problem.state_names)  # a map takes one point of a cycle, too
@@ -65,7 +67,7 @@ def _without_mesh(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
 _SLACK = 1e-9
 
 
-def _on_mesh(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
+def _on_mesh(problem: BoundaryValueProblem, guess: Guess, options: Options) -> tuple[System, Array]:
     guess = problem.whole_guess(guess, {**problem.parameters, **options.parameters})
     a, b = problem.domain
     mesh = np.linspace(a, b, options.intervals + 1)
@@ -139,7 +141,7 @@ def _sampled(guess: Guess, nodes: Array, count: int, periods: Array | None = Non
     return np.tile(_numbers(guess, count), (len(nodes), 1))
 
 
-def _numbers(values: Any, count: int | None = None) -> Array:
+def _numbers(values: object, count: int | None = None) -> Array:
     """Return a guess as an array of numbers, shape (count,) where that is given."""
     try:
         array = np.asarray(values, dtype=float)

@@ -142,7 +142,7 @@ def _solution(start: Point, free: Sequence[str]) -> Point:
     return dataclasses.replace(found, label=start.label, name=start.name, x=point.x, system=system, details=point)
 
 
-def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
+def _own_tangent(start: Point, system: Discretization, settings: Settings) -> Array | None:
     """Return the tangent of the branch that a branch point was found on, oriented; None at other points."""
     known = finding_of(start.details)
     if not known.leaving or system is not start.system:
@@ -152,7 +152,7 @@ def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
     return settings.direction * oriented_along(tangent, rate)
 
 
-def _tangent(start: Point, system: Any, branch: int) -> Array:
+def _tangent(start: Point, system: Discretization, branch: int) -> Array:
     """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order.
 
     Raises

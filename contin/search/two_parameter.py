@@ -181,7 +181,7 @@ def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
     return ExtremumCurve(base.base, objective), x[: base.base.size]
 
 
-def _values(start: Point, base: Any, x: Array) -> _First | None:
+def _values(start: Point, base: System, x: Array) -> _First | None:
     """A point where a column has a given value."""
     value = start.value
     if value is None or not abs(start[start.column] - value) <= _LOCATED * (1 + abs(value)):
@@ -203,7 +203,7 @@ def _holding(start: Point, column: str) -> Point:
     return dataclasses.replace(start, column=column, value=start[column])
 
 
-def _value(start: Point, base: Any, x: Array) -> _First:
+def _value(start: Point, base: System, x: Array) -> _First:
     """The value of a column."""
     column, value = start.column, start.value
     assert value is not None
@@ -217,12 +217,13 @@ def _off(column: str, value: float, trial: Trial) -> float:
     return trial[column] - value
 
 
-def _slope(column: str, system: Any, x: Array) -> Array:
-    found: Array = system.column_gradient(x, column)
+def _slope(column: str, system: System, x: Array) -> Array:
+    found = system.column_gradient(x, column)
+    assert found is not None
     return found
 
 
-def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
+def _of_codimension_two(start: Point, base: System, x: Array) -> _First | None:
     """A point that a test function of its curve has labelled."""
     for test in start.system.events():
         if (test.label, test.name) == (start.label, start.name):
@@ -230,7 +231,7 @@ def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     return None
 
 
-def _event(start: Point, base: Any, x: Array, event: Event) -> _First:
+def _event(start: Point, base: System, x: Array, event: Event) -> _First:
     """A zero of a user's test function.
 
     Raises
