@@ -32,6 +32,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.boundary.system import Collocation
 from contin.collocation.basis import interpolation
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
@@ -119,7 +120,7 @@ def stability_of(point: SpecialPoint) -> Stability:
     found = second_variation(system, trial.x)
     if found is None:
         return Stability()
-    breaks = found.broken(nullity, system.problem.symmetries) if point.label == "BP" else ()
+    breaks = found.broken(nullity, system.problem.symmetries) if point.label == Label.BRANCH_POINT else ()
     return Stability(found.index(nullity), nullity, breaks)
 
 

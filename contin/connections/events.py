@@ -31,6 +31,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.connections.equations import ConnectionEquations
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
@@ -80,7 +81,7 @@ def own_test_of(label: str, system: ConnectionEquations, x: Array) -> Event | No
     Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
     """
     trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
-    if label in ("IFS", "IFU"):
+    if label in (Label.INCLINATION_FLIP_STABLE, Label.INCLINATION_FLIP_UNSTABLE):
         return _inclination_flip("SU".index(label[-1]), known=True)
     found = [test for test in homoclinic_points(system) if test.label == located != "EP"]
     return min(found, key=lambda test: abs(test.function(trial)), default=None)
@@ -157,17 +158,18 @@ def named(point: SpecialPoint, solution: Trial | None = None) -> SpecialPoint:
 
 def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
-    if point.label not in ("NSS", "NCH", "BT") or not point.is_located:
+    if point.label not in (Label.NEUTRAL_SADDLE, Label.NON_CENTRAL, Label.BOGDANOV_TAKENS) or not point.is_located:
         return None
     if _system(point.trial).problem.saddle_node:
         values = _system(point.trial).saddle(point.trial.x).values
         critical = np.count_nonzero(np.abs(values.real) < _ON_AXIS * np.abs(values).max())
-        return ("ZH", "zero-Hopf: the saddle-node has a pair, too") if point.label == "BT" and critical > 2 else None
+        has_pair = point.label == Label.BOGDANOV_TAKENS and critical > 2
+        return (Label.ZERO_HOPF, "zero-Hopf: the saddle-node has a pair, too") if has_pair else None
     kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
-    if point.label == "NSS" and any(kinds):
+    if point.label == Label.NEUTRAL_SADDLE and any(kinds):
         return ("NFF", "neutral bifocus") if all(kinds) else ("NSF", "neutral saddle-focus")
     nearest = int(np.argmin([abs(_leading(point.trial, side)[0].real) for side in (0, 1)]))
-    return ("SH", "Shilnikov-Hopf") if point.label == "NCH" and kinds[nearest] else None
+    return ("SH", "Shilnikov-Hopf") if point.label == Label.NON_CENTRAL and kinds[nearest] else None
 
 
 def _system(trial: Trial) -> ConnectionEquations:

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Carrier, Discretization
 from contin.core.trial import Trial
@@ -120,7 +121,7 @@ def _again(point: Solution, system: Discretization, carry: Carrier) -> Array:
     if known.has_equations:
         there: Trial = known.again(system, carry, point.x, Newton()).there(system, carry(point.tangent))
         return there.x
-    if point.label == "LP" and point.column in system.free and np.isfinite(point.tangent).all():
+    if point.label == Label.FOLD and point.column in system.free and np.isfinite(point.tangent).all():
         return zero_again(system, x, carry(point.tangent), fold(point.column), Newton())[0].x
     if system.size == system.equations:
         return correct(system, x).x
@@ -133,7 +134,7 @@ def _of_place(point: Solution, functional: Functional, here: Array, apart: Apart
     """Return what the numbers change over the distance that the place of a special point is known to."""
     system, name = point.system, next(iter(point.system.free), "")
     located = point.errors.get(name, 0.0)
-    if not located or point.label in ("LP", "BP") or not np.isfinite(point.tangent).all():
+    if not located or point.label in (Label.FOLD, Label.BRANCH_POINT) or not np.isfinite(point.tangent).all():
         return 0.0
     beside = Trial.without_tangent(system, point.x + _ALONG * point.tangent)
     moved = abs(beside[name] - Trial.without_tangent(system, point.x)[name])

@@ -10,6 +10,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.state import Stop
 from contin.results import plot, table
 from contin.results.axes import Axes
@@ -105,7 +106,7 @@ class Branch:
         (1, 0)
         """
         found = [point for point in self.points if point.label == label]
-        return found if label == "EP" else [point for point in found if point.name != "start"]
+        return found if label == Label.END else [point for point in found if point.arclength]
 
     def to_pandas(self) -> Any:
         """Return all points as a ``pandas.DataFrame``, a row a point, in order.

@@ -11,6 +11,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.errors import ProblemError
 from contin.results.axes import Axes, new_axes
 from contin.results.point import Point
@@ -24,7 +25,7 @@ _MARKS = {
 }  # fmt: skip
 _OTHER_MARK = (".", "#000000")
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
-_CRITICAL = ("LP", "BP", "PD", "TR", "HB")
+_CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)
 #: Dashes and legend of pieces, by whether they are stable; None: not known.
 _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
 #: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.

@@ -12,6 +12,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.boundary.second_variation import SecondVariation, second_variation
+from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
@@ -141,7 +142,7 @@ class Point(Record):
         curve: Any = self.system
         if not curve.on_curve or not curve.base.leaving:
             return ()
-        own = curve.kind if self.label != "HH" else ""
+        own = curve.kind if self.label != Label.DOUBLE_HOPF else ""
         return tuple(kind for kind in curve.base.leaving.get(self.label, ()) if kind != own)
 
     @checks.arguments
@@ -311,7 +312,7 @@ class Point(Record):
         """
         if not self.system.solution.is_cycle:
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
-        fold = self.label == "LP" and self.column != PERIOD and not self.system.on_curve
+        fold = self.label == Label.FOLD and self.column != PERIOD and not self.system.on_curve
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
 
     def phase_loads(self) -> dict[str, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.core.differences import derivative
+from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
 from contin.errors import ProblemError
@@ -37,7 +38,7 @@ def sensitivities(
     if len(system.free) != system.problem.free_size:
         raise ProblemError("point: must be one of a branch, with the free parameters of a curve")
     wide, x = system.with_free((*system.free, *by), point.x)
-    if point.label == "LP":
+    if point.label == Label.FOLD:
         return _of_fold(point, wide, x, by)
     if point.is_simple_branch_point:
         return {name: _of_branch_point(point, name) for name in by}
@@ -56,10 +57,10 @@ def _fixed(point: Record, held: str | Callable[[Trial], float] | None) -> str | 
         return held
     system = system_of(point, "point")
     columns = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
-    if held is None and point.label == "HB" and frequency_of(point) is not None and not system.intervals:
+    if held is None and point.label == Label.HOPF and frequency_of(point) is not None and not system.intervals:
         return critical_real_part(point.details["frequency"])
     if held is None:
-        held = point.column or (system.free[0] if point.label in ("", "EP") else None)
+        held = point.column or (system.free[0] if point.label in (Label.REGULAR, Label.END) else None)
     if held is None:
         raise ProblemError(f"held: must be given at a point {point.label} {point.name!r}: a column, or a function of a trial")
     if held not in columns:

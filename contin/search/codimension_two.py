@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.core.labels import Label
 from contin.core.newton import correct
 from contin.core.protocol import Discretization
 from contin.core.trial import linearization
@@ -61,11 +62,11 @@ def leaving(start: Point, kind: str, branch: int) -> First:
     frequencies = _frequencies(start, base, x)
     if kind == "homoclinic":
         return _homoclinic(base, x)
-    if kind == "HB":
+    if kind == Label.HOPF:
         return _hopf_points(base, x, frequencies[-1] if frequencies else 0.0)
-    if start.label == "GH":
+    if start.label == Label.GENERALIZED_HOPF:
         return _corrected_cycle(base, x, frequencies[0], None)
-    if kind == "TR":
+    if kind == Label.TORUS:
         return _tori(base, x, frequencies, branch)
     return FoldCurve(base), x, None
 
@@ -79,11 +80,11 @@ def _equilibrium(start: Point) -> tuple[Algebraic, Array]:
 
 def _frequencies(start: Point, base: Algebraic, x: Array) -> list[float]:
     """Return the frequencies of the critical pairs: that of the curve first; none at a Bogdanov-Takens point."""
-    if start.label == "BT":
+    if start.label == Label.BOGDANOV_TAKENS:
         return []
     values = base.eigenvalues(x)
     upper = values[values.imag > 0]
-    count = 2 if start.label == "HH" else 1
+    count = 2 if start.label == Label.DOUBLE_HOPF else 1
     found = sorted(float(value.imag) for value in upper[np.argsort(np.abs(upper.real))[:count]])
     own = start.functionals.get("frequency", found[0])
     return sorted(found, key=lambda frequency: abs(frequency - own))

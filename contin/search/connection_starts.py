@@ -10,6 +10,7 @@ from contin.arrays import Array
 from contin.connections.events import crossing, ending
 from contin.connections.statement import ConnectionProblem
 from contin.connections.system import ConnectionCollocation
+from contin.core.labels import Label
 from contin.core.trial import Trial, linearization
 from contin.errors import ProblemError
 from contin.problems.angles import winding_names
@@ -22,7 +23,7 @@ _ALONG = 1e-4
 
 def leaves_saddle_node(point: Point) -> bool:
     """Return whether a point is a non-central homoclinic orbit to a saddle-node, where two curves meet."""
-    return point.label == "NCH" and not point.system.on_curve
+    return point.label == Label.NON_CENTRAL and not point.system.on_curve
 
 
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:

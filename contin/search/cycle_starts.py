@@ -12,6 +12,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.collocation.degree import CYCLE_DEGREE
 from contin.collocation.mesh import MeshControl
+from contin.core.labels import Label
 from contin.core.scales import usual
 from contin.cycles.maps import MapSystem
 from contin.cycles.statement import CycleProblem
@@ -34,7 +35,7 @@ _INTERVALS = 20
 
 def switches(point: Point) -> bool:
     """Return whether a branch of another kind begins at a point."""
-    return point.system.starts_cycles and (point.label == "HB" or doubles(point))
+    return point.system.starts_cycles and (point.label == Label.HOPF or doubles(point))
 
 
 def switched(
@@ -71,7 +72,7 @@ def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Ar
         It is no Hopf point of equilibria.
     """
     system: Any = point.system
-    if point.label != "HB" or system.is_cycle or not system.starts_cycles:
+    if point.label != Label.HOPF or system.is_cycle or not system.starts_cycles:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
     if not pair.is_critical:

@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.continuation.progress import Progress
 from contin.continuation.run import Continuation
+from contin.core.labels import Label
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.state import Reason, Stop
@@ -165,7 +166,7 @@ def _name(junction: Junction, number: int) -> str:
 def _is_end(point: Point) -> bool:
     """Return whether a Hopf point or period doubling is where a branch of cycles ends that begins there."""
     system: Any = point.system
-    if point.label == "HB" or not system.is_cycle:
+    if point.label == Label.HOPF or not system.is_cycle:
         return bool(system.is_cycle)
     return bool(system.is_doubled(point.x))
 
@@ -274,7 +275,7 @@ class _Explorer:
             ours |= {f"max_{name}": value for name, value in zip(known.system.problem.states, states)}
         angles = declared(known.system.problem, "angles")
         names = [name for name in ours if name in theirs and name != ROUNDS and name not in winding_names(angles)]
-        factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
+        factor = 2.0 if _is_end(point) and point.label == Label.PERIOD_DOUBLING else 1.0
         for name in names:
             mine = ours[name] * (factor if name == PERIOD else 1.0)
             apart = np.array([theirs[name] - mine])

@@ -11,6 +11,7 @@ from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.basis import basis, interpolation
 from contin.continuation.run import Continuation
+from contin.core.labels import Label
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.cycles.statement import CycleProblem
@@ -24,7 +25,7 @@ from contin.results.auto_07p import AutoSolution
 from contin.results.point import Point
 
 #: Labels of points that contin locates, too.
-_LOCATED = ("BP", "LP", "HB", "PD", "TR")
+_LOCATED = (Label.BRANCH_POINT, Label.FOLD, Label.HOPF, Label.PERIOD_DOUBLING, Label.TORUS)
 #: The run goes back from AUTO's solution, and then looks for the point at so many places, in steps that begin with this length.
 #: With steps ten times larger, more than one point of a kind can lie in the first one.
 _STEP, _LOOKS = 0.01, 20

@@ -12,6 +12,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
+from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
 from contin.errors import ConvergenceError, ProblemError, warn
@@ -130,7 +131,7 @@ def follow(
 def _solution(start: Point, free: Sequence[str]) -> Point:
     """Return the solution itself of a point of a curve; where folds meet a branch point, as that point of its branches."""
     found = underlying(start)
-    if found is start or start.label != "BP":
+    if found is start or start.label != Label.BRANCH_POINT:
         return found
     system, x = found.system.with_free(free, found.x)  # type: ignore[attr-defined]
     try:

@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
+from contin.core.labels import Label
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.system import System
 from contin.core.trial import Event, Trial
@@ -102,7 +103,7 @@ def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings,
     if kind is None:
         return follow_until_interrupted(Continuation(start.system, start.x, settings), shown)
     system, x, tangent = leaving(start, kind, branch)
-    beside = tangent is not None and kind != "HB"
+    beside = tangent is not None and kind != Label.HOPF
     found = follow_until_interrupted(Continuation(system, x, settings, tangent, singular=False), shown)
     if not beside:
         found.points[0] = dataclasses.replace(found.points[0], label=start.label, name=start.name)
@@ -116,7 +117,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
         raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
     branch = not system.on_curve
-    found_in = start.column if start.label == "LP" and start.column and branch else system.free[0]
+    found_in = start.column if start.label == Label.FOLD and start.column and branch else system.free[0]
     if (second is None) == (free is None):
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
     if free is None:
@@ -162,7 +163,7 @@ def _branch_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _folds(start: Point, base: System, x: Array) -> _First | None:
-    return (FoldCurve(base), x) if start.label == "LP" and start.column else None
+    return (FoldCurve(base), x) if start.label == Label.FOLD and start.column else None
 
 
 def _of_the_kind(start: Point, base: System, x: Array) -> _First | None:
@@ -170,13 +171,13 @@ def _of_the_kind(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _extrema(start: Point, base: System, x: Array) -> _First | None:
-    return (ExtremumCurve(base, start.column), x) if start.label == "EX" and start.column else None
+    return (ExtremumCurve(base, start.column), x) if start.label == Label.EXTREMUM and start.column else None
 
 
 def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
     """An extremum along a curve of extrema; a fold with respect to the parameter of a curve of folds is one, too."""
     objective = base.stationary
-    if not objective or start.label not in ("EX", "LP") or start.column != objective:
+    if not objective or start.label not in (Label.EXTREMUM, Label.FOLD) or start.column != objective:
         return None
     return ExtremumCurve(base.base, objective), x[: base.base.size]
 

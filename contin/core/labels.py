@@ -1,0 +1,40 @@
+"""Labels of special points: AUTO's two letters, and those of MatCont where AUTO has none."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Label(enum.StrEnum):
+    """Labels that contin itself compares; each is a string, too. Events of users may have others."""
+
+    REGULAR = ""
+    END = "EP"
+    FAILED = "MX"
+    USER_ZERO = "UZ"
+    EXTREMUM = "EX"
+    FOLD = "LP"
+    BRANCH_POINT = "BP"
+    HOPF = "HB"
+    PERIOD_DOUBLING = "PD"
+    TORUS = "TR"
+    CUSP = "CP"
+    BOGDANOV_TAKENS = "BT"
+    ZERO_HOPF = "ZH"
+    DOUBLE_HOPF = "HH"
+    GENERALIZED_HOPF = "GH"
+    GENERALIZED_DOUBLING = "GPD"
+    CHENCINER = "CH"
+    FOLD_FLIP = "LPPD"
+    FOLD_TORUS = "LPTR"
+    RESONANCE_1 = "R1"
+    RESONANCE_2 = "R2"
+    RESONANCE_3 = "R3"
+    RESONANCE_4 = "R4"
+    NEUTRAL_SADDLE = "NSS"
+    NEUTRAL_SADDLE_FOCUS = "NSF"
+    NEUTRAL_BIFOCUS = "NFF"
+    NON_CENTRAL = "NCH"
+    SHILNIKOV_HOPF = "SH"
+    INCLINATION_FLIP_STABLE = "IFS"
+    INCLINATION_FLIP_UNSTABLE = "IFU"
