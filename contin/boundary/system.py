@@ -10,13 +10,13 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.boundary.equations import BoundaryEquations
+from contin.collocation.corners import Selections, breaks_of, selections
 from contin.collocation.mesh import MeshControl, adapted_mesh, moved_to_breaks, near, with_breaks
 from contin.collocation.switching import NOWHERE, Switching, joined, switching
 from contin.core.protocol import Carrier
 from contin.core.trial import Event
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability
-from contin.functions.batch import Selections
 
 #: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about
 #: that: ten times smaller is round-off of the place itself.
@@ -100,13 +100,13 @@ class Collocation(BoundaryEquations):
     @functools.cached_property
     def breaks(self) -> Array:
         """Places where the equations have jumps or corners in t, whatever the states are: points of a good mesh."""
-        given = *self.problem.domain, self.parameters, self._free
-        return np.unique(np.concatenate([self.problem.batch(name).switches(*given) for name in self._of_the_mesh]))
+        given = self.problem.domain, self.parameters, self._free
+        return np.unique(np.concatenate([breaks_of(self.problem.batch(name), *given) for name in self._of_the_mesh]))
 
     @functools.cached_property
     def _selections(self) -> list[tuple[str, Selections]]:
         """Conditions of these functions, by the name of the function."""
-        found = [(name, self.problem.batch(name).selections(self._free)) for name in self._of_the_mesh]
+        found = [(name, selections(self.problem.batch(name), self._free)) for name in self._of_the_mesh]
         return [(name, each) for name, each in found if each is not None]
 
     @property

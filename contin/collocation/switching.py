@@ -19,11 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.functions.batch import Selections
+from contin.collocation.corners import Selections, brackets, narrowed
 
-#: Divisions of the part of an interval in which a switch happens into 32, down to the last digit of its ends. The 31 places
-#: between are one block of the interpreter: they take as long as one.
-_DIVISIONS, _DIVIDED = 10, np.arange(33) / 32
 #: Places on each side of a switch where the gap is looked at, as parts of the distance to the end.
 _PARTS = np.array([0.1, 0.4, 0.7, 1.0])
 #: Half an interval's cost, relative to the size of the state, below which a selection is smooth. It is round-off of the usual
@@ -101,7 +98,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         return found
 
     with np.errstate(all="ignore"):
-        a, b, which = _brackets(*_sampled(system, selections, x, p))
+        a, b, which = brackets(*_sampled(system, selections, x, p))
         if not a.size:
             return NOWHERE
         units = sizes()[selections.of_gaps[:, 1]]
@@ -113,7 +110,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         if not rough.any():
             return NOWHERE
         which, at, half = which[rough], at[rough], half[rough]
-        places = _narrowed(sides, a[rough], b[rough], which)
+        places = narrowed(sides, a[rough], b[rough], which)
         ends = np.array([np.maximum(places - half, mesh[0]), np.minimum(places + half, mesh[-1])])
         inside = np.array([mesh[at], mesh[at + 1]])
         gap = np.fmin(*[worst(places, end, which) for end in ends])
@@ -136,25 +133,6 @@ def _sampled(system: Any, selections: Selections, x: Array, p: Array) -> tuple[A
     return times, selections.sides(times, system.evaluate(x, times), p)
 
 
-def _brackets(times: Array, there: Array) -> tuple[Array, Array, Indices]:
-    """Return the times before and behind each switch of a condition, and the numbers of the conditions."""
-    at, which = np.nonzero(there[1:] != there[:-1])
-    return times[at], times[at + 1], which
-
-
-def _narrowed(sides: Any, a: Array, b: Array, which: Indices) -> Array:
-    """Return the times between a and b at which conditions switch."""
-    each = np.arange(a.size)
-    first = sides(a)[each, which]
-    for _ in range(_DIVISIONS):
-        times = a[:, None] + (b - a)[:, None] * _DIVIDED
-        there = sides(times[:, 1:-1].ravel()).reshape(a.size, _DIVIDED.size - 2, -1)[each, :, which]
-        switched = np.column_stack([there != first[:, None], np.full(a.size, True)])
-        at = switched.argmax(axis=1)
-        a, b = times[each, at], times[each, at + 1]
-    return b
-
-
 def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Array) -> Array:
     """Return the largest gap of each switch at its own times, shape (K, parts); gaps (K parts, gaps) are those of all.
 
@@ -163,7 +141,7 @@ def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Arr
     sizes, number, parts = np.abs(gaps), selections.of_gaps[:, 0], away.shape[1]
     found = away.copy()
     for k, selection in enumerate(which.tolist()):
-        if selections.found[selection].gaps is not None:
+        if selections.known[selection]:
             found[k] = sizes[k * parts : (k + 1) * parts, number == selection].max(axis=1, initial=0.0)
     return found
 

@@ -14,6 +14,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
+from contin.collocation.corners import breaks_of
 from contin.collocation.extremes import extremes
 from contin.collocation.mesh import MeshControl
 from contin.collocation.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
@@ -334,7 +335,7 @@ class ForcedEquations(PeriodicEquations):
         """Places on the unit interval where the forcing has jumps or corners that no free parameter moves: t = s T(p)."""
         moved = self.parameters.copy()
         moved[self._free] *= _OTHERWISE
-        here, there = (self.problem.batch("field").switches(*self.problem.domain, p) for p in (self.parameters, moved))
+        here, there = (breaks_of(self.problem.batch("field"), self.problem.domain, p) for p in (self.parameters, moved))
         still = np.abs(here[:, None] - there) <= _STILL if there.size else np.zeros((here.size, 1), dtype=bool)
         found: Array = here[still.any(axis=1)]
         return found

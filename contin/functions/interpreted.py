@@ -9,16 +9,18 @@ from __future__ import annotations
 import contextlib
 import copy
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function, Indices
+from contin.arrays import Array, Indices
 from contin.errors import InterpretedWarning, ProblemError, warn
 from contin.functions import round_off
-from contin.functions.signature import Signature, named_values
+from contin.functions.interpreter import Loaded
+from contin.functions.recorded import Request
+from contin.functions.signature import Signature, UserFunction
 
 #: First length of differences, relative to the size of an input, of first and of higher derivatives, which are differences of
 #: differences. Errors of fourth order and of round-off are below 1e-11, or 1e-8, where a function changes over such a size.
@@ -62,18 +64,20 @@ class Interpreted:
     ----------
     reason : str
         Why the functions are not recorded.
+    kept : dict
+        What a batch has made for these functions.
     error : float
         Largest estimated error of a derivative so far, relative to the largest derivative at its place and to the values over
         the sizes of the inputs.
     """
 
-    def __init__(self, functions: Sequence[Function], counts: Sequence[int], signature: Signature, reason: str) -> None:
-        self._functions, self._counts, self._signature, self.reason = tuple(functions), tuple(counts), signature, reason
-        self._tuples = [None if names is None else named_values(tuple(names)) for names in signature.arguments]
-        self._fills = [signature.fills(function) for function in self._functions]
-        self._for_arrays: dict[int, bool] = {}
+    def __init__(self, functions: Sequence[UserFunction], signature: Signature, reason: str) -> None:
+        self._functions, self._signature, self.reason = functions, signature, reason
+        self._count = sum(function.size for function in functions)
+        self._for_arrays: dict[UserFunction, bool] = {}
         self._said = False
         self._sizes: tuple[Array, Array] | None = None
+        self.kept: dict[Hashable, Any] = {}
         self.error = 0.0
 
     def sized(self, inputs: Array, values: Array) -> Interpreted:
@@ -82,49 +86,52 @@ class Interpreted:
         found._sizes = inputs, values
         return found
 
-    def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
-        """Return the values, shape (places, count)."""
-        return self._values(t, self._joined(u, v, p))
+    def is_current(self) -> bool:
+        """Return whether constants are those that the functions read: they are read at each call."""
+        return True
 
-    def jacobian(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices) -> tuple[Array, Array]:
-        """Return values and derivatives by ``inputs``, shape (places, count, inputs)."""
-        x = self._joined(u, v, p)
-        slopes = [self._along(t, x, [np.broadcast_to(unit, x.shape)]).values for unit in np.eye(x.shape[1])[inputs]]
-        if slopes and not self._said:
-            self._said = True
-            self._say()
-        return self._values(t, x), np.stack(slopes, axis=2) if slopes else np.zeros((len(x), self._count, 0))
+    def describe(self) -> str:
+        """Return one line: why the functions are evaluated in Python."""
+        return f"evaluated in Python, because {self.reason}"
 
-    def entries(
-        self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, rows: Indices, places: Indices
-    ) -> tuple[Array, Array]:
-        """Return the values at one place, and the derivatives of the values ``rows`` by the inputs in the columns
-        ``places``."""
-        values, jacobian = self.jacobian(t, u, v, p, inputs)
-        return values[0], jacobian[0, rows, places]
+    def text(self, labels: Sequence[str], time: str) -> list[str]:
+        """Raise ProblemError: there is no recording."""
+        raise ProblemError(f"there is no text: {self.describe()}")
 
-    def entries_of(self, inputs: Sequence[int]) -> tuple[Indices, Indices]:
+    def load(self, request: Request) -> Loaded:
+        """Raise ProblemError: there is no program."""
+        raise ProblemError(f"there is no program: {self.describe()}")
+
+    def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian, all of which may differ from zero."""
         rows, columns = np.indices((self._count, len(inputs))).reshape(2, -1)
         return rows, columns
 
-    def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of the values along directions, shape (places, count)."""
-        x = self._joined(u, v, p)
-        return self._along(t, x, [np.broadcast_to(direction, x.shape) for direction in directions]).values
+    def evaluate(
+        self, request: Request, t: Array, u: Array, v: Array, p: Array, given: Sequence[Array] = ()
+    ) -> tuple[Array, Array]:
+        """Return values (places, count) and Jacobian, as `contin.functions.recorded.Recorded.evaluate`."""
+        inputs, order, weighted, packed = request
+        x = np.hstack([*([u, v] if self._signature.ends else [u]), np.tile(p, (len(u), 1))])
+        directions = [np.broadcast_to(direction, x.shape) for direction in given[:order]]
 
-    def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, directions: Sequence[Array]) -> Array:
-        """Return the derivative of the Jacobian along directions, shape (places, count, inputs)."""
-        x = self._joined(u, v, p)
-        given = [np.broadcast_to(direction, x.shape) for direction in directions]
-        found = [self._along(t, x, [np.broadcast_to(unit, x.shape), *given]).values for unit in np.eye(x.shape[1])[inputs]]
-        return np.stack(found, axis=2) if found else np.zeros((len(x), self._count, 0))
+        def along(*more: Array) -> Array:
+            return self._along(t, x, [*(np.broadcast_to(unit, x.shape) for unit in more), *directions]).values
 
-    def _joined(self, u: Array, v: Array, p: Array) -> Array:
-        return np.hstack([*([u, v] if self._signature.ends else [u]), np.tile(p, (len(u), 1))])
+        values = along() if inputs is None or not order else np.empty((len(x), 0))
+        if inputs is None:
+            return values, np.empty((0, 0, 0))
+        slopes = [along(unit) for unit in np.eye(x.shape[1])[list(inputs)]]
+        jacobian = np.stack(slopes, axis=2) if slopes else np.zeros((len(x), self._count, 0))
+        if slopes and not order and not self._said:
+            self._said = True
+            self._say()
+        if weighted:
+            jacobian = np.einsum("ka,kaj->kj", given[order], jacobian)[:, None]
+        return values, jacobian.reshape(len(x), 1, -1) if packed else jacobian
 
     def _say(self) -> None:
-        names = " and ".join(self._name(index) for index in range(len(self._functions)))
+        names = " and ".join(function.name for function in self._functions)
         how = f"differences (an estimated error of {self.error:.0e})"
         text = f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
         warn(text, InterpretedWarning)
@@ -188,23 +195,16 @@ class Interpreted:
             self.error = max(self.error, float(known[np.isfinite(known)].max(initial=0.0)))
         return _Estimated(best, errors)
 
-    @property
-    def _count(self) -> int:
-        return sum(max(count, 1) for count in self._counts)
-
     # --- values --------------------------------------------------------------------------------------------------
 
     def _values(self, t: Array, x: Array) -> Array:
         """Return the values, shape (places, count), for inputs x (places, inputs)."""
-        columns = []
         if self._sizes is not None:
             x = x * self._sizes[0]
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
-            for index in range(len(self._functions)):
-                columns.append(self._function_values(index, t, x))
-        shapes = [(len(x), max(count, 1)) for count in self._counts]
-        found = np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
+            columns = [self._function_values(function, t, x) for function in self._functions]
+        found = np.hstack([column.reshape(len(x), each.size) for column, each in zip(columns, self._functions)])
         if np.iscomplexobj(found):  # Python's (-1.0) ** 0.5 is complex: it has no real value
             found = np.where(found.imag == 0, found.real, np.nan)
         if self._sizes is not None:
@@ -214,68 +214,47 @@ class Interpreted:
             round_off.move(found)
         return found
 
-    def _function_values(self, index: int, t: Array, x: Array) -> Array:
-        if len(x) > 1 and self._takes_arrays(index, t, x):
+    def _function_values(self, function: UserFunction, t: Array, x: Array) -> Array:
+        if len(x) > 1 and self._takes_arrays(function, t, x):
             with contextlib.suppress(ArithmeticError, ValueError):  # it has no value at one of the places
-                return self._at_all(index, t, x)
-        return np.array([self._at_one(index, time, place) for time, place in zip(t, x)])
+                return self._at_all(function, t, x)
+        return np.array([self._at_one(function, time, place) for time, place in zip(t.tolist(), x)])
 
-    def _takes_arrays(self, index: int, t: Array, x: Array) -> bool:
+    def _takes_arrays(self, function: UserFunction, t: Array, x: Array) -> bool:
         """Return whether a function gives the same for arrays of places as for one after the other."""
-        if index not in self._for_arrays:
+        if function not in self._for_arrays:
             places = _beside(x[:1])
             times = np.repeat(t[:1], len(places))
             try:
-                together = self._at_all(index, times, places)
-                single = np.array([self._at_one(index, time, place) for time, place in zip(times, places)])
-                self._for_arrays[index] = bool(np.allclose(together, single, rtol=1e-12, atol=0, equal_nan=True))
+                together = self._at_all(function, times, places)
+                single = np.array([self._at_one(function, time, place) for time, place in zip(times.tolist(), places)])
+                self._for_arrays[function] = bool(np.allclose(together, single, rtol=1e-12, atol=0, equal_nan=True))
             except Exception:  # a function of numbers may raise anything
-                self._for_arrays[index] = False
-        return self._for_arrays[index]
+                self._for_arrays[function] = False
+        return self._for_arrays[function]
 
-    def _at_all(self, index: int, t: Array, x: Array) -> Array:
+    def _given(self, t: Any, x: Any) -> list[Any]:
+        return [t, *x] if self._signature.times else list(x)
+
+    def _at_all(self, function: UserFunction, t: Array, x: Array) -> Array:
         """Return the values of a function called once with arrays of places, shape (places, count)."""
-        count = max(self._counts[index], 1)
-        result = self._called(index, t, np.ascontiguousarray(x.T), (count, len(x)))
-        rows = result if self._counts[index] or self._fills[index] else (result,)
+        result = function.call(self._given(t, np.ascontiguousarray(x.T)), np.array, shape=(len(x),))
+        rows = result if function.count or function.fills else (result,)
         return np.stack([np.broadcast_to(np.asarray(row), (len(x),)) for row in rows], axis=1)
 
-    def _at_one(self, index: int, t: Any, x: Array) -> Array:
+    def _at_one(self, function: UserFunction, t: float, x: Array) -> Array:
         """Return the values of a function at one place; NaN where they are not defined."""
-        count = max(self._counts[index], 1)
-        numbers = x if self._fills[index] else x.tolist()
         try:
-            result = np.asarray(self._called(index, float(t), numbers, (count,))).reshape(-1)
-            if result.size != count or result.dtype.kind not in "iufcb":
-                raise ProblemError(f"{self._name(index)} returned {checks.shown(result)}, must be {count} numbers")
+            result = np.asarray(function.call(self._given(t, x.tolist()), np.array)).reshape(-1)
+            if result.size != function.size or result.dtype.kind not in "iufcb":
+                raise ProblemError(f"{function.name} returned {checks.shown(result)}, must be {function.size} numbers")
             return result
         except ArithmeticError:
-            return np.full(count, np.nan)
+            return np.full(function.size, np.nan)
         except ValueError as error:
             if "domain" in str(error):  # that of Python's math
-                return np.full(count, np.nan)
+                return np.full(function.size, np.nan)
             raise
-
-    def _name(self, index: int) -> str:
-        function = self._functions[index]
-        return str(getattr(function, "__name__", None) or checks.shown(function))
-
-    def _called(self, index: int, t: Any, x: Any, shape: tuple[int, ...]) -> Any:
-        """Call a function with t, and groups of the inputs x as named tuples; or as arrays, if it fills one."""
-        function, place, arguments = self._functions[index], 0, []
-        fills = self._fills[index]
-        for kind in self._tuples:
-            if kind is None:
-                arguments.append(t)
-                continue
-            group = x[place : place + len(kind._fields)]
-            place += len(kind._fields)
-            arguments.append(group if fills else kind(*group))
-        if not fills:
-            return function(*arguments)
-        result = np.zeros(shape, dtype=np.asarray(x).dtype)
-        function(*arguments, result)
-        return result
 
 
 def _beside(x: Array) -> Array:

@@ -7,6 +7,7 @@ only where a function does the same each time.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,12 +18,12 @@ import numpy as np
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.program import TIME
-from contin.functions.recorded_arrays import NUMPY, _plain, numbers
+from contin.functions.recorded_arrays import NUMPY, numbers
 from contin.functions.recorded_complex import ComplexNumber
 from contin.functions.recorded_function import RecordedFunction
-from contin.functions.signature import Arguments, Signature, argument_count, named_values, takes_arrays
+from contin.functions.signature import Arguments, Signature, UserFunction, component_count, flat
 from contin.functions.stand_ins import prepared
-from contin.functions.tape import Number, Tape, Unrecordable
+from contin.functions.tape import Tape, Unrecordable
 
 #: Largest number of paths through the decisions of one function. Each doubles its operations at most.
 _PATHS = 64
@@ -71,8 +72,8 @@ def sized(recording: Recording) -> Recording:
     return Recording(tape, results, time.place, tuple(each.place for each in given))
 
 
-def record(functions: Sequence[Function], counts: Sequence[int], signature: Signature) -> Recording:
-    """Return the recording of functions; ``counts`` are their numbers of values, 0 for a bare number.
+def record(functions: Sequence[UserFunction], signature: Signature) -> Recording:
+    """Return the recording of functions.
 
     Raises
     ------
@@ -81,44 +82,35 @@ def record(functions: Sequence[Function], counts: Sequence[int], signature: Sign
     tape = Tape(NUMPY)
     time = tape.input(TIME)
     inputs = [tape.input(slot) for slot in range(signature.inputs)]
-    results: list[int] = []
-    for function, count in zip(functions, counts):
-        results += _recorded(tape, function, count, signature, time, inputs)
+    given, results = _given(signature, time, inputs), list[int]()
+    for function in functions:
+        places = recorded_paths(tape, function.function, functools.partial(function.values, given, numbers))
+        if len(places) != function.size:
+            raise Unrecordable(f"it returns {len(places)} values, not {function.size}")
+        results += places
     return Recording(tape, tuple(results), time.place, tuple(each.place for each in inputs))
 
 
-def checked(functions: Sequence[Function], counts: Sequence[int], signature: Signature) -> Recording:
+def _given(signature: Signature, time: Any, inputs: Sequence[Any]) -> list[Any]:
+    """Return what functions of a signature are called with."""
+    return [time, *inputs] if signature.times else list(inputs)
+
+
+def checked(functions: Sequence[UserFunction], signature: Signature) -> Recording:
     """Return the recording, made twice and compared with values in Python.
 
     Raises
     ------
     Unrecordable
     """
-    found = record(functions, counts, signature)
-    if not record(functions, counts, signature).same(found):
+    found = record(functions, signature)
+    if not record(functions, signature).same(found):
         raise Unrecordable("it is not the same when it is called again")
     row = 0
-    for function, count in zip(functions, counts):
-        size = max(count, 1)
-        _compare(function, count, signature, found, found.results[row : row + size])
-        row += size
+    for function in functions:
+        _compare(function, signature, found, found.results[row : row + function.size])
+        row += function.size
     return found
-
-
-def _recorded(
-    tape: Tape, function: Function, count: int, signature: Signature, time: Number, inputs: Sequence[Number]
-) -> list[int]:
-    """Return the places of the values of one function."""
-    size, fills = max(count, 1), signature.fills(function)
-
-    def call(copy: Any) -> Sequence[Any]:
-        found = _called(copy, fills, size, signature, time, inputs)
-        return list(found) if count or fills else [found]
-
-    places = recorded_paths(tape, function, call)
-    if len(places) != size:
-        raise Unrecordable(f"it returns {len(places)} values, not {size}")
-    return places
 
 
 def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequence[Any]]) -> list[int]:
@@ -211,26 +203,7 @@ def _sentence(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _called(function: Any, fills: bool, size: int, signature: Signature, time: Any, inputs: Sequence[Any]) -> Any:
-    """Call a function with numbers, as named tuples or, if it fills an array, as arrays."""
-    arguments: list[Any] = []
-    place = 0
-    for names in signature.arguments:
-        if names is None:
-            arguments.append(time)
-            continue
-        group = list(inputs[place : place + len(names)])
-        place += len(names)
-        arguments.append(numbers(group) if fills else named_values(tuple(names))(*group))
-    if not fills:
-        result = function(*arguments)
-        return (_plain(result).ravel().tolist() if result.ndim else result.item()) if isinstance(result, np.ndarray) else result
-    filled = numbers([0.0] * size)
-    function(*arguments, filled)
-    return filled.tolist()
-
-
-def _compare(function: Function, count: int, signature: Signature, recording: Recording, places: Sequence[int]) -> None:
+def _compare(function: UserFunction, signature: Signature, recording: Recording, places: Sequence[int]) -> None:
     """Compare values of the tape with those of Python, at a few places where Python has some.
 
     Raises
@@ -239,17 +212,12 @@ def _compare(function: Function, count: int, signature: Signature, recording: Re
         They differ.
     """
     random = np.random.default_rng(11)
-    size = max(count, 1)
     for center in _CENTERS:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1
         try:
             with np.errstate(all="ignore"):
-                if signature.fills(function):
-                    expected = _filled(function, size, signature, time, inputs)
-                else:
-                    found = _called(function, False, size, signature, time, inputs)
-                    expected = np.array(found if count else [found], dtype=float)
+                expected = np.array(function.values(_given(signature, time, inputs), np.array), dtype=float)
         except Exception:  # it has no value there; whatever it raises
             continue
         values: dict[Any, float] = {TIME: time, **dict(enumerate(inputs))}
@@ -260,68 +228,34 @@ def _compare(function: Function, count: int, signature: Signature, recording: Re
             raise Unrecordable("its values are not those of its recording")
 
 
-def _filled(function: Function, size: int, signature: Signature, time: float, inputs: Sequence[float]) -> Any:
-    """Return the values of a function that fills an array."""
-    arguments: list[Any] = []
-    place = 0
-    for names in signature.arguments:
-        if names is None:
-            arguments.append(time)
-            continue
-        arguments.append(np.array(inputs[place : place + len(names)]))
-        place += len(names)
-    result = np.zeros(size)
-    function(*arguments, result)
-    return result
-
-
 #: Places around which functions are compared: positive and negative numbers.
 _CENTERS = (0.5, 1.5, -0.5)
 
 
-def function_of(function: Function, arguments: Arguments, count: int | None = None) -> RecordedFunction:
+def function_of(function: Function, arguments: Arguments) -> RecordedFunction:
     """Return a user's function as a recording, which can be pickled and compared.
 
     Parameters
     ----------
-    arguments : sequence of tuple of str or None
-        Names of the components of each argument; None for a number.
-    count : int, optional
-        Number of values of a function that fills an array, its last argument.
+    arguments : sequence of tuple of str, list of them, or None
+        Names of the components of each argument; None for a number, a list for a tuple of named tuples. A function that fills
+        an array fills one like the first of them with names.
 
     Raises
     ------
     Unrecordable
     """
     tape, single = Tape(NUMPY), True
-    places: list[int] = []
+    inputs = [tape.input(("argument", number)) for number in range(component_count(list(arguments)))]
+    own = UserFunction(function, arguments, next((component_count(names) for names in arguments if names is not None), 0))
 
-    def inputs(names: Any) -> Any:
-        if isinstance(names, list):
-            return tuple(inputs(each) for each in names)
-        group = [tape.input(("argument", len(places) + number)) for number in range(1 if names is None else len(names))]
-        places.extend(each.place for each in group)
-        return group[0] if names is None else named_values(tuple(names))(*group)
-
-    groups = [inputs(names) for names in arguments]
-    fills = argument_count(function) == len(arguments) + 1
-    arrays = not fills and takes_arrays(function, arguments)
-
-    def call(copy: Any) -> Sequence[Any]:
+    def call(copy: Function) -> Sequence[Any]:
         nonlocal single
-        last = len(groups) - (not fills)
-        given = [numbers(list(group)) if isinstance(group, tuple) and (fills or arrays) and number < last else group
-                 for number, group in enumerate(groups)]  # fmt: skip
-        if fills:
-            filled = numbers([0.0] * (count or len(groups[0])))
-            copy(*given, filled)
-            single = False
-            return list(filled.tolist())
-        result = copy(*given)
-        single = not isinstance(result, (tuple, list)) and np.ndim(result) == 0
-        return [result] if single else (_plain(result).ravel().tolist() if isinstance(result, np.ndarray) else list(result))
+        found = flat(own.call(inputs, numbers, copy))
+        single = not isinstance(found, (tuple, list))
+        return [found] if single else list(found)
 
     results = recorded_paths(tape, function, call)
-    letters = [f"a{number}" for number in range(len(groups))]
+    letters = [f"a{number}" for number in range(len(arguments))]
     name = getattr(function, "__name__", "function")
-    return RecordedFunction(name, letters, list(arguments), tape, places, results, single)
+    return RecordedFunction(name, letters, list(arguments), tape, [each.place for each in inputs], results, single)

@@ -1,4 +1,4 @@
-"""Arguments and results of a user's functions: their names, and their numbers."""
+"""Arguments and results of a user's functions: their names, their numbers, and the ways in which functions take them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,10 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 
-#: Names of the arguments of a function that are named tuples; None for one that is a number.
-Arguments = Sequence[tuple[str, ...] | None]
+#: Names of the arguments of a function that are named tuples; None for one that is a number, a list for a tuple of them.
+Arguments = Sequence[Any]
+#: Makes an array of a list of numbers.
+Maker = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,75 @@ class Signature:
     def fills(self, function: Function) -> bool:
         """Return whether a function has one argument more: an array that it fills."""
         return argument_count(function) == len(self.arguments) + 1
+
+
+class UserFunction:
+    """A user's function with the way in which it takes its arguments.
+
+    Parameters
+    ----------
+    function : callable
+        It takes named tuples; or arrays of states, and parameters as a named tuple; or arrays, and one more that it fills.
+    arguments : sequence
+        Names of the components of each argument.
+    count : int
+        Number of values; 0 for one number that is no tuple.
+    """
+
+    def __init__(self, function: Function, arguments: Arguments, count: int) -> None:
+        self.function, self.arguments, self.count, self.size = function, arguments, count, max(count, 1)
+        self.fills = argument_count(function) == len(arguments) + 1
+        self._arrays = len(arguments) if self.fills else len(arguments) - 1 if takes_arrays(function, arguments) else 0
+
+    @property
+    def name(self) -> str:
+        """How messages name it."""
+        return str(getattr(self.function, "__name__", None) or checks.shown(self.function))
+
+    def call(self, numbers: Sequence[Any], array: Maker, copy: Function | None = None, shape: tuple[int, ...] = ()) -> Any:
+        """Return what the function, or a copy of it, returns for the components of its arguments one after the other.
+
+        ``array`` makes the arrays that it takes; ``shape`` is that of a component.
+        """
+        given = _grouped(self.arguments, iter(numbers), array, self._arrays)
+        function = self.function if copy is None else copy
+        if not self.fills:
+            return function(*given)
+        filled = array(np.zeros((self.size, *shape)))
+        function(*given, filled)
+        return filled
+
+    def values(self, numbers: Sequence[Any], array: Maker, copy: Function | None = None) -> list[Any]:
+        """Return the values for plain or recorded numbers, as `call`."""
+        found = flat(self.call(numbers, array, copy))
+        return list(found) if self.count or self.fills else [found]
+
+
+def flat(result: Any) -> Any:
+    """Return what a function returns, an array as a list or a number."""
+    if isinstance(result, np.ndarray):
+        return result.ravel().tolist() if result.ndim else result.item()
+    return result
+
+
+def _grouped(arguments: Arguments, numbers: Iterator[Any], array: Maker, arrays: int) -> list[Any]:
+    """Return arguments made of their components, the first ``arrays`` of them as arrays."""
+    given: list[Any] = []
+    for place, names in enumerate(arguments):
+        if names is None:
+            given.append(next(numbers))
+        elif isinstance(names, list):
+            given.append(tuple(_grouped(names, numbers, array, 0)))
+        elif place < arrays:
+            given.append(array([next(numbers) for _ in names]))
+        else:
+            given.append(named_values(tuple(names))(*[next(numbers) for _ in names]))
+    return given
+
+
+def component_count(names: Any) -> int:
+    """Return the number of components of an argument, or of several."""
+    return 1 if names is None else sum(map(component_count, names)) if isinstance(names, list) else len(names)
 
 
 def argument_count(function: Function) -> int:
@@ -149,26 +220,19 @@ def _returned(function: Function, arguments: Arguments, arrays: bool, what: str)
     plain = getattr(function, "py_func", function)
     first: Exception | None = None
     for number in _PROBES:
-        values: list[Any] = [number if names is None else _probe(names, number) for names in arguments]
-        if arrays:
-            values[:-1] = [np.array(value) if isinstance(value, tuple) else value for value in values[:-1]]
+        numbers = [number + 0.01 * i for names in arguments for i in range(component_count(names))]
         try:
             with np.errstate(all="ignore"):
-                result = plain(*values)
+                result = plain(*_grouped(arguments, iter(numbers), np.array, len(arguments) - 1 if arrays else 0))
         except (ArithmeticError, ValueError) as error:  # it may have values elsewhere
             first = first or error
             continue
         if isinstance(result, (dict, set, str)):
             raise ProblemError(f"{what} returns a {type(result).__name__}, must return numbers in the order of their equations")
-        if isinstance(result, np.ndarray):
-            return result.size if result.ndim else 0
-        return len(result) if isinstance(result, (tuple, list)) else 0
+        found = flat(result)
+        return len(found) if isinstance(found, (tuple, list)) else 0
     assert first is not None
     raise first
-
-
-def _probe(names: tuple[str, ...], number: float) -> Any:
-    return named_values(tuple(names))(*[number + 0.01 * i for i in range(len(names))])
 
 
 #: Numbers with which functions are called to see what they return: in the domain of most functions. NaN, the last, is in the

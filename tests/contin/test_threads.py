@@ -22,8 +22,8 @@ SOME = [1, 2, 3, 5]
 def use(monkeypatch):
     """A function that sets the number of threads; problems of any size use them."""
     monkeypatch.setattr(segments, "_LARGE", 0)
-    monkeypatch.setattr("contin.functions.batch._MANY", 1)
-    monkeypatch.setattr("contin.functions.batch._LONG", -1.0)
+    monkeypatch.setattr("contin.functions.recorded._MANY", 1)
+    monkeypatch.setattr("contin.functions.recorded._LONG", -1.0)
     return lambda count: monkeypatch.setenv("CONTIN_THREADS", str(count))
 
 

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 import contin
 from contin import BoundaryValueProblem, CycleProblem, VariationalProblem
 from contin.collocation.basis import basis
+from contin.collocation.corners import breaks_of
 from contin.collocation.mesh import MeshControl, adapted_mesh, with_breaks
 from contin.errors import InterpretedWarning
 from contin.lowlevel import Batch
@@ -141,4 +142,4 @@ def test_a_function_in_python_has_no_switches():
     with pytest.warns(InterpretedWarning):
         batch = Batch([lambda t, u, p: float(str(u.x)) * (t < 0.5)], [0], ["x"], [])
         batch.jacobian(np.zeros(1), np.ones((1, 1)), np.empty((0, 1)), np.empty(0), batch.columns([]))
-    assert batch.switches(0, 1, np.empty(0)).size == 0
+    assert breaks_of(batch, (0, 1), np.empty(0)).size == 0

@@ -14,6 +14,7 @@ import contin
 from contin import BoundaryValueProblem, CycleProblem
 from contin.collocation import switching
 from contin.collocation.basis import basis
+from contin.collocation.corners import selections
 from contin.collocation.defect import split
 from contin.collocation.mesh import MeshControl, moved_to_breaks
 from contin.errors import InterpretedWarning
@@ -285,14 +286,14 @@ def test_smooth_selections_are_no_corners():
     )
     point = contin.solve(problem, lambda t: (t * (1 - t), 1 - 2 * t))
     found = point.system.switching(point.x)
-    assert point.system.problem.batch("field").selections([]) is not None
+    assert selections(point.system.problem.batch("field")) is not None
     assert not len(found.places) or found.settled.all()  # mesh points at most
     assert not found.jumps.any()
 
 
 def test_the_place_of_a_smooth_selection_is_not_sought(monkeypatch):
     """That takes most of the time of a point of a branch. The places of a corner are sought."""
-    sought, narrowed = [], switching._narrowed
+    sought, narrowed = [], switching.narrowed
 
     def counted(sides, a, b, which):
         sought.append(a.size)
@@ -301,7 +302,7 @@ def test_the_place_of_a_smooth_selection_is_not_sought(monkeypatch):
     def sine(x):  # the next term of the series is 1e-32 where they are joined
         return x - x**3 / 6 + x**5 / 120 - x**7 / 5040 + x**9 / 362880 - x**11 / 39916800 if x < 0.02 else math.sin(x)
 
-    monkeypatch.setattr(switching, "_narrowed", counted)
+    monkeypatch.setattr(switching, "narrowed", counted)
     for law, passes in ((sine, []), (lambda x: sine(x) + max(0, x - 0.1), [2])):
         problem = BoundaryValueProblem(
             lambda t, u, p, law=law: (u.v, -p.q - law(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 1.0}
