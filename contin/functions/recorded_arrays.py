@@ -8,67 +8,72 @@ sparse ones of SciPy) become one operation for each result.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex, is_complex, part
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Tape, Unrecordable, power
 
+#: Operands of operations. Arrays of objects may hold complex numbers as well.
+Scalar = Number | float
+#: A recorded number of any kind.
+_RECORDED = (Number, ComplexNumber)
+
 
 class Numbers(np.ndarray):
     """An array of recorded and ordinary numbers."""
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: Any) -> Any:
         return ufunc_of_numbers(ufunc, method, inputs, options)
 
-    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
+    def __array_function__(
+        self, function: Callable[..., Any], types: object, inputs: Iterable[Any], options: Mapping[str, Any]
+    ) -> Any:
         return function_of_numbers(function, inputs, options)
 
-    def dot(self, other: Any, out: Any = None) -> Any:
+    def dot(self, other: object, out: None = None) -> Any:  # type: ignore[override]
         """Return the product with a vector or matrix."""
         return matrix_product(self, other)
 
     @property  # type: ignore[misc]
     def real(self) -> Any:
         """The real parts."""
-        return _parts(self, "real")
+        return _parts("real")(self)
 
     @property  # type: ignore[misc]
     def imag(self) -> Any:
         """The imaginary parts."""
-        return _parts(self, "imag")
+        return _parts("imag")(self)
 
     def conj(self) -> Any:
         """Return the conjugate numbers."""
-        return _parts(self, "conjugate")
+        return _parts("conjugate")(self)
 
     conjugate = conj
 
 
-def numbers(values: Any) -> Any:
+def numbers(values: object) -> Any:
     """Return an array of objects as `Numbers`."""
-    if isinstance(values, np.ndarray) and values.dtype == object:
-        return values.view(Numbers)
-    array = np.empty(np.shape(values), dtype=object)
-    array[...] = values
-    return array.view(Numbers)
+    return np.asarray(values, dtype=object).view(Numbers)
 
 
-def recorded(*values: Any) -> Number | ComplexNumber | None:
+def recorded(*values: object) -> Number | ComplexNumber | None:
     """Return the first recorded number among values and the elements of arrays, lists and tuples; None without any."""
     for value in values:
-        if isinstance(value, (Number, ComplexNumber)):
+        if isinstance(value, _RECORDED):
             return value
         if isinstance(value, (list, tuple)):
             found = recorded(*value)
         elif isinstance(value, np.ndarray) and value.dtype == object:
-            found = next((each for each in value.flat if isinstance(each, (Number, ComplexNumber))), None)
+            found = next((each for each in value.flat if isinstance(each, _RECORDED)), None)
         else:
             continue
         if found is not None:
@@ -76,42 +81,28 @@ def recorded(*values: Any) -> Number | ComplexNumber | None:
     return None
 
 
-def elementwise(function: Callable[..., Any], *inputs: Any) -> Any:
+def elementwise(function: Callable[..., Any], *inputs: object) -> Any:
     """Return a function of numbers applied to arrays, broadcast; a number for numbers."""
     if not any(isinstance(value, (np.ndarray, list, tuple)) for value in inputs):
         return function(*(value.item() if isinstance(value, np.generic) else value for value in inputs))
-    arrays = np.broadcast_arrays(*(_plain(value) for value in inputs))
+    arrays = np.broadcast_arrays(*map(_plain, inputs))
     result = np.empty(arrays[0].shape, dtype=object)
-    flat = [array.ravel() for array in arrays]
-    result.ravel()[:] = [function(*values) for values in zip(*(each.tolist() for each in flat))] or np.empty(0, dtype=object)
-    return result.view(Numbers) if result.ndim else result.item()
+    result.ravel()[:] = [function(*values) for values in zip(*(array.ravel().tolist() for array in arrays))] or result.ravel()
+    return _with_class(result)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> NDArray[Any]:
     """Return an array without our own class, so that NumPy's functions act on it as they are."""
-    if isinstance(value, (Number, ComplexNumber)):
-        array = np.empty((), dtype=object)
-        array[()] = value
-        return array
     if isinstance(value, Numbers):
         return value.view(np.ndarray)
-    if isinstance(value, (list, tuple)) and recorded(value) is not None:
-        return numbers(_nested(value)).view(np.ndarray)
-    return np.asarray(value)
+    return np.array(value, dtype=object) if recorded(value) is not None else np.asarray(value)
 
 
-def _nested(value: Any) -> Any:
-    """Return a list of lists of numbers as an array of objects."""
-    if isinstance(value, (list, tuple)):
-        parts = [_nested(part) for part in value]
-        shapes = {np.shape(part) for part in parts}
-        if len(shapes) != 1:
-            raise Unrecordable("it makes an array of lists of different lengths")
-        result = np.empty((len(parts), *shapes.pop()), dtype=object)
-        for place, part in enumerate(parts):
-            result[place] = part
-        return result
-    return value.view(np.ndarray) if isinstance(value, Numbers) else value
+def _with_class(value: Any) -> Any:
+    """Return arrays of objects as `Numbers`, those of no dimension as a number; lists and tuples of them as well."""
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return value.view(Numbers) if value.ndim else value.item()
+    return type(value)(map(_with_class, value)) if type(value) in (list, tuple) else value
 
 
 # --- functions of numbers -----------------------------------------------------------------------------------------------
@@ -124,20 +115,17 @@ def operation(name: str) -> Callable[..., Any]:
         if any(map(is_complex, values)):
             return function_of_complex(name, *values[:1])
         tape = _tape(values)
-        if tape is None:
-            scratch = Tape()
-            return scratch.apply(name, *values).known
-        return tape.apply(name, *values)
+        return Tape().apply(name, *values).known if tape is None else tape.apply(name, *values)
 
     return apply
 
 
-def _tape(values: Sequence[Any]) -> Tape | None:
+def _tape(values: Sequence[object]) -> Tape | None:
     found = recorded(*values)
     return None if found is None else found.tape
 
 
-def select(condition: Any, a: Any, b: Any) -> Any:
+def select(condition: Scalar, a: Any, b: Any) -> Any:
     """Return a where a condition holds, else b."""
     tape = _tape((condition, a, b))
     if tape is None or not isinstance(condition, Number):
@@ -148,30 +136,34 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     return tape.apply("select", condition, a, b)
 
 
-def largest(a: Any, b: Any) -> Any:
+def largest(a: Scalar, b: Scalar) -> Any:
     """Return the larger of two numbers, the first of equal ones."""
     return select(a < b, b, a)
 
 
-def smallest(a: Any, b: Any) -> Any:
+def smallest(a: Scalar, b: Scalar) -> Any:
     """Return the smaller of two numbers, the first of equal ones."""
     return select(b < a, b, a)
 
 
-def _parts(values: Any, name: str) -> Any:
-    """Return a part of every number, or its conjugate."""
-    return elementwise(lambda value: part(value, name), values)
+def clip(a: Scalar, low: Scalar | None = None, high: Scalar | None = None) -> Any:
+    """Return a number within bounds."""
+    a = a if low is None else largest(a, low)
+    return a if high is None else smallest(a, high)
+
+
+def _parts(name: str) -> Callable[[object], Any]:
+    """Return the function that takes a part of every number, or its conjugate."""
+    return lambda values: elementwise(lambda value: part(value, name), values)
 
 
 def _power(a: Any, b: Any) -> Any:
-    if is_complex(a) or is_complex(b):
-        return a**b
-    if isinstance(a, Number):
+    if isinstance(a, Number) and not is_complex(b):
         return power(a, b)
-    return power(b.tape.number(a), b) if isinstance(b, Number) else a**b
+    return power(b.tape.number(a), b) if isinstance(b, Number) and not is_complex(a) else a**b
 
 
-def _scaled(factor: float) -> Callable[[Any], Any]:
+def _scaled(factor: float) -> Callable[[Scalar], Any]:
     return lambda a: a * factor
 
 
@@ -197,13 +189,7 @@ UFUNCS |= {
 }  # fmt: skip
 
 
-def clip(a: Any, low: Any = None, high: Any = None) -> Any:
-    """Return a number within bounds."""
-    a = a if low is None else largest(a, low)
-    return a if high is None else smallest(a, high)
-
-
-def ufunc_of_numbers(ufunc: Any, method: str, inputs: Sequence[Any], options: dict[str, Any]) -> Any:
+def ufunc_of_numbers(ufunc: np.ufunc, method: str, inputs: Sequence[object], options: dict[str, Any]) -> Any:
     """Return a universal function of recorded numbers.
 
     Raises
@@ -211,56 +197,48 @@ def ufunc_of_numbers(ufunc: Any, method: str, inputs: Sequence[Any], options: di
     Unrecordable
         A function that the tape does not know.
     """
-    if ufunc.__name__ in ("matmul", "vecdot") and method == "__call__":
-        return _stored(matrix_product(*inputs), options)
-    function = UFUNCS.get(ufunc.__name__)
+    name = ufunc.__name__
+    if name in ("matmul", "vecdot") and method == "__call__":
+        return _stored(matrix_product(*inputs), **options)
+    function = UFUNCS.get(name)
     if function is None:
-        raise Unrecordable(f"it calls {ufunc.__name__}, which cannot be differentiated")
+        raise Unrecordable(f"it calls {name}, which cannot be differentiated")
     if method == "__call__":
-        return _stored(elementwise(function, *inputs), options)
+        return _stored(elementwise(function, *inputs), **options)
     if method == "reduce":
-        return _reduced(ufunc.__name__, function, inputs[0], options)
+        return _reduced(name, inputs[0], **{"axis": 0, **options})
     if method == "outer":
-        a, b = (_plain(value) for value in inputs)
+        a, b = map(_plain, inputs)
         return elementwise(function, a.reshape(a.shape + (1,) * b.ndim), b)
     if method == "accumulate":
-        values = _plain(inputs[0]).tolist()
-        for place in range(1, len(values)):
-            values[place] = function(values[place - 1], values[place])
-        return numbers(values)
-    raise Unrecordable(f"it calls {ufunc.__name__}.{method}")
+        return numbers(list(itertools.accumulate(_plain(inputs[0]).tolist(), function)))
+    raise Unrecordable(f"it calls {name}.{method}")
 
 
-def _stored(result: Any, options: dict[str, Any]) -> Any:
+def _stored(result: Any, out: tuple[NDArray[Any], ...] | None = None, **_: object) -> Any:
     """Return the result, in the array ``out`` where one is given."""
-    out = options.get("out")
     if not out:
         return result
-    target = out[0]
-    if target.dtype != object:
+    if out[0].dtype != object:
         raise Unrecordable("it stores recorded numbers in an array of another kind")
-    target.view(np.ndarray)[...] = _plain(result)
-    return target
+    out[0].view(np.ndarray)[...] = _plain(result)
+    return out[0]
 
 
-def _reduced(name: str, function: Callable[..., Any], array: Any, options: dict[str, Any]) -> Any:
-    """Return the reduction of an array along one axis, or of all of it."""
-    array, axis = _plain(array), options.get("axis", 0)
-    if axis is None:
-        array, axis = array.ravel(), 0
-    if isinstance(axis, tuple):
-        kept = [place for place in range(array.ndim) if place not in {each % array.ndim for each in axis}]
-        array = np.transpose(array, [*kept, *axis]).reshape([array.shape[place] for place in kept] + [-1])
-        axis = -1
-    moved = np.moveaxis(array, axis, -1)
-    result = np.empty(moved.shape[:-1], dtype=object)
-    initial = options.get("initial", np._NoValue)
-    for place in np.ndindex(result.shape):
-        values = moved[place].tolist() + ([] if initial is np._NoValue or initial is None else [initial])
-        result[place] = total(values) if name == "add" else functools.reduce(function, values)
-    if options.get("keepdims"):
-        result = np.expand_dims(result, axis)
-    return _stored(result.view(Numbers) if result.ndim else result.item(), options)
+def _reduced(
+    name: str, values: object, axis: int | Sequence[int] | None = None, *, keepdims: bool = False, initial: object = None,
+    **options: Any,
+) -> Any:  # fmt: skip
+    """Return the reduction of an array by a universal function, along axes or of all of it."""
+    array = _plain(values)
+    axes = tuple(range(array.ndim)) if axis is None else tuple(np.atleast_1d(axis) % array.ndim)
+    kept = [extent for place, extent in enumerate(array.shape) if place not in axes]
+    moved = np.moveaxis(array, axes, range(len(kept), array.ndim)).reshape(*kept, -1)
+    result, first = np.empty(kept, dtype=object), [] if initial is np._NoValue or initial is None else [initial]
+    for place in np.ndindex(*kept):
+        terms = moved[place].tolist() + first
+        result[place] = total(terms) if name == "add" else functools.reduce(UFUNCS[name], terms)
+    return _stored(_with_class(np.expand_dims(result, axes) if keepdims else result), **options)
 
 
 def total(values: Sequence[Any]) -> Any:
@@ -270,9 +248,8 @@ def total(values: Sequence[Any]) -> Any:
         return sum(values)
     if any(map(is_complex, values)):
         return functools.reduce(operator.add, values)
-    known = [value for value in values if not isinstance(value, Number)]
     terms = [value for value in values if isinstance(value, Number)]
-    constant = math.fsum(map(float, known))
+    constant = math.fsum(float(value) for value in values if not isinstance(value, Number))
     terms += [tape.number(constant)] if constant else []
     return terms[0] if len(terms) == 1 else tape.apply("sum", *terms)
 
@@ -280,21 +257,14 @@ def total(values: Sequence[Any]) -> Any:
 # --- products with matrices ---------------------------------------------------------------------------------------------
 
 
-def matrix_product(a: Any, b: Any) -> Any:
+def matrix_product(a: object, b: object) -> Any:
     """Return the product of two arrays, of one or two dimensions, at least one of recorded numbers."""
-    a, b = _plain(a), _plain(b)
-    if a.ndim == 1 and b.ndim == 1:
-        return scalar_product(a.tolist(), b.tolist())
-    if a.ndim > 2 or b.ndim > 2 or not a.ndim or not b.ndim:
+    x, y = _plain(a), _plain(b)
+    if x.ndim > 2 or y.ndim > 2 or not x.ndim or not y.ndim:
         raise Unrecordable("it multiplies arrays of more than two dimensions")
-    rows, columns = (a if a.ndim == 2 else a[None]), (b if b.ndim == 2 else b[:, None])
-    found = np.empty((len(rows), columns.shape[1]), dtype=object)
-    listed, others = rows.tolist(), columns.T.tolist()
-    for i, row in enumerate(listed):
-        for j, column in enumerate(others):
-            found[i, j] = scalar_product(row, column)
-    found = found if a.ndim == 2 else found[0]
-    return (found if b.ndim == 2 else found[..., 0]).view(Numbers)
+    columns = np.atleast_2d(y.T).tolist()
+    found = [[scalar_product(row, column) for column in columns] for row in np.atleast_2d(x).tolist()]
+    return _with_class(np.array(found, dtype=object).reshape(x.shape[:-1] + y.shape[1:]))
 
 
 def scalar_product(a: Sequence[Any], b: Sequence[Any]) -> Any:
@@ -305,19 +275,19 @@ def scalar_product(a: Sequence[Any], b: Sequence[Any]) -> Any:
     if tape is None or any(map(is_complex, [*a, *b])):
         return sum(x * y for x, y in zip(a, b))
     if any(isinstance(x, Number) and isinstance(y, Number) for x, y in zip(a, b)):
-        return tape.number(0.0) if not a else (a[0] * b[0] if len(a) == 1 else tape.apply("dot", *a, *b))
+        return a[0] * b[0] if len(a) == 1 else tape.apply("dot", *a, *b)
     pairs = [(x, y) if isinstance(y, Number) else (y, x) for x, y in zip(a, b)]
     return linear(tape, [(float(factor), value) for factor, value in pairs])
 
 
-def linear(tape: Tape, terms: Sequence[tuple[float, Any]]) -> Number:
+def linear(tape: Tape, terms: Sequence[tuple[float, Scalar]]) -> Number:
     """Return a sum with constant factors as one operation."""
-    constant = math.fsum(factor * float(value) for factor, value in terms if not isinstance(value, Number))
-    terms = [(factor, value) for factor, value in terms if factor != 0 and isinstance(value, Number)]
-    if not terms:
+    constant = math.fsum(factor * value for factor, value in terms if not isinstance(value, Number))
+    moving = [(factor, value) for factor, value in terms if factor != 0 and isinstance(value, Number)]
+    if not moving:
         return tape.number(constant)
-    factors, values = tuple(factor for factor, _ in terms), [value for _, value in terms]
-    result = terms[0][1] * terms[0][0] if len(terms) == 1 else tape.apply("linear", *values, data=factors)
+    factors, values = zip(*moving)
+    result: Number = values[0] * factors[0] if len(moving) == 1 else tape.apply("linear", *values, data=factors)
     return result + constant if constant else result
 
 
@@ -336,71 +306,57 @@ class SparseConstant:
         """The transposed matrix."""
         return SparseConstant(self._matrix.T)
 
-    def __matmul__(self, vector: Any) -> Any:
+    def __matmul__(self, vector: object) -> Any:
         tape = _tape((vector,))
         if tape is None:
             return self._matrix @ vector
         given, rows = _plain(vector), self._rows
         if given.ndim != 1 or given.size != rows.shape[1]:
             raise ValueError(f"a matrix of shape {rows.shape} times an array of shape {given.shape}")
-        values, result = given.tolist(), np.empty(rows.shape[0], dtype=object)
+        values, factors, columns = given.tolist(), rows.data.tolist(), rows.indices.tolist()
         mixed = rows.dtype.kind == "c" or any(map(is_complex, values))
-        for i, (first, last) in enumerate(zip(rows.indptr, rows.indptr[1:])):
-            terms = list(zip(rows.data[first:last].tolist(), rows.indices[first:last].tolist()))
-            result[i] = (
-                sum(factor * values[j] for factor, j in terms)
-                if mixed
-                else linear(tape, [(factor, values[j]) for factor, j in terms])
-            )
-        return result.view(Numbers)
+        found = []
+        for first, last in itertools.pairwise(rows.indptr.tolist()):
+            terms = [(factors[k], values[columns[k]]) for k in range(first, last)]
+            found.append(sum(factor * value for factor, value in terms) if mixed else linear(tape, terms))
+        return numbers(found)
 
-    def dot(self, vector: Any) -> Any:
+    def dot(self, vector: object) -> Any:
         """Return the product with a vector."""
         return self @ vector
 
-    def __rmatmul__(self, vector: Any) -> Any:
+    def __rmatmul__(self, vector: object) -> Any:
         return self.T @ vector
 
-    def __mul__(self, factor: Any) -> Any:
-        return self.dot(factor) if recorded(factor) is not None and np.ndim(factor) else NotImplemented
+    def __mul__(self, factor: object) -> Any:
+        many = isinstance(factor, (np.ndarray, list, tuple)) and recorded(factor) is not None
+        return self.dot(factor) if many else NotImplemented
 
 
 # --- functions of NumPy -------------------------------------------------------------------------------------------------
 
 
-def function_of_numbers(function: Any, inputs: Any, options: dict[str, Any]) -> Any:
+def function_of_numbers(function: Callable[..., Any], inputs: Iterable[Any], options: Mapping[str, Any]) -> Any:
     """Return a function of NumPy of recorded numbers: one of `FUNCTIONS`, or NumPy's own on arrays of objects."""
     own = FUNCTIONS.get(function)
     if own is not None:
         return own(*inputs, **options)
-    inputs, options = _without_class(inputs), {name: _without_class(value) for name, value in options.items()}
-    result = function(*inputs, **options)
-    return _with_class(result)
+    return _with_class(function(*map(_without_class, inputs), **{name: _without_class(each) for name, each in options.items()}))
 
 
 def _without_class(value: Any) -> Any:
-    if isinstance(value, (Number, ComplexNumber, Numbers)):
+    if isinstance(value, (*_RECORDED, Numbers)):
         return _plain(value)
-    if type(value) in (list, tuple):
-        return type(value)(_without_class(part) for part in value)
-    return value
+    return type(value)(map(_without_class, value)) if type(value) in (list, tuple) else value
 
 
-def _with_class(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.dtype == object:
-        return value.view(Numbers) if value.ndim else value.item()
-    if isinstance(value, (list, tuple)):
-        return type(value)(_with_class(part) for part in value) if type(value) in (list, tuple) else value
-    return value
-
-
-def _where(condition: Any, a: Any = None, b: Any = None) -> Any:
-    if a is None or b is None:
+def _where(condition: object, *sides: object) -> Any:
+    if not sides:
         raise Unrecordable("it asks where a condition holds")
-    return elementwise(select, condition, a, b)
+    return elementwise(select, condition, *sides)
 
 
-def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:  # noqa: A002  NumPy's name
+def _norm(x: object, ord: object = None, axis: object = None, keepdims: bool = False) -> Any:  # noqa: A002  NumPy's name
     values = _plain(x)
     if axis is not None or keepdims or (ord not in (None, 2) or (ord == 2 and values.ndim != 1)):
         raise Unrecordable("it calls np.linalg.norm with an order or an axis")
@@ -410,82 +366,71 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     return operation("sqrt")(scalar_product(listed, listed))
 
 
-def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
+def _interp(x: object, xp: Any, fp: Any, left: float | None = None, right: float | None = None, period: None = None) -> Any:
     if period is not None or recorded(xp, fp) is not None:
         raise Unrecordable("np.interp has a period, or knots that are no constants")
-    table = Table.linear(xp, fp, left, right)
-    return elementwise(lambda value: _tabulated(table, value), x)
+    return tabulated(Table.linear(xp, fp, left, right))(x)
 
 
-def _tabulated(table: Table, value: Any) -> Any:
-    return value.tape.apply("table", value, data=table) if isinstance(value, Number) else table.evaluate(value)
-
-
-def tabulated(table: Table) -> Callable[[Any], Any]:
+def tabulated(table: Table) -> Callable[[object], Any]:
     """Return a piecewise polynomial as a function of numbers and arrays."""
-    return lambda x: elementwise(lambda value: _tabulated(table, value), x)
+
+    def at(value: Scalar) -> Scalar:
+        return value.tape.apply("table", value, data=table) if isinstance(value, Number) else table.evaluate(value)
+
+    return lambda x: elementwise(at, x)
 
 
-def _clip(a: Any, a_min: Any = None, a_max: Any = None, **options: Any) -> Any:
+def _clip(a: object, a_min: object = None, a_max: object = None, **options: Any) -> Any:
     low, high = options.get("min", a_min), options.get("max", a_max)
     return elementwise(lambda value: clip(value, low, high), a)
 
 
-def _cross(a: Any, b: Any) -> Any:
+def _cross(a: object, b: object) -> Any:
     x, y = _plain(a).tolist(), _plain(b).tolist()
     if len(x) != 3 or len(y) != 3:
         raise Unrecordable("it calls np.cross for arrays that are no vectors of three numbers")
     return numbers([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
 
 
-def _polyval(p: Any, x: Any) -> Any:
-    x = numbers(_plain(x)) if isinstance(x, (list, tuple)) else x
-    result = 0.0 * x
-    for coefficient in list(p):
-        result = result * x + coefficient
-    return result
+def _polyval(p: Sequence[Any], x: Any) -> Any:
+    x = numbers(x) if isinstance(x, (list, tuple)) else x
+    return functools.reduce(lambda result, coefficient: result * x + coefficient, list(p), 0.0 * x)
 
 
 def _reduction(name: str) -> Callable[..., Any]:
-    """Return a function of NumPy that reduces an array by a universal function, along an axis or all of it."""
-    return lambda a, axis=None, **options: _reduced(name, UFUNCS[name], a, {"axis": axis, **options})
+    """Return a function of NumPy that reduces an array by a universal function."""
+    return functools.partial(_reduced, name)
 
 
-def _mean(a: Any, axis: Any = None, **options: Any) -> Any:
-    array = _plain(a)
-    axes = range(array.ndim) if axis is None else ([axis] if isinstance(axis, int) else axis)
-    return _reduced("add", UFUNCS["add"], array, {"axis": axis, **options}) / math.prod(array.shape[each] for each in axes)
+def _mean(a: object, *axis: Any, **options: Any) -> Any:
+    found = _reduced("add", a, *axis, **options)
+    return found / (_plain(a).size // max(np.size(found), 1))
 
 
-def _like(value: Any) -> Callable[..., Any]:
-    def make(a: Any, *given: Any, **options: Any) -> Any:
-        array = np.empty(np.shape(_plain(a)), dtype=object)
-        array[...] = given[0] if given else value
-        return array.view(Numbers)
-
-    return make
+def _like(value: float) -> Callable[..., Any]:
+    return lambda a, *given, **options: numbers(np.full(_plain(a).shape, given[0] if given else value, dtype=object))
 
 
 #: Functions of NumPy that are not universal, and are written for recorded numbers here.
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where, np.linalg.norm: _norm, np.interp: _interp, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
-    np.vdot: lambda a, b: scalar_product(np.ravel(_plain(_parts(a, "conjugate"))).tolist(), _plain(b).ravel().tolist()),
+    np.vdot: lambda a, b: scalar_product(_plain(_parts("conjugate")(a)).ravel().tolist(), _plain(b).ravel().tolist()),
     np.inner: matrix_product, np.polyval: _polyval, np.zeros_like: _like(0.0), np.ones_like: _like(1.0),
     np.empty_like: _like(0.0), np.full_like: _like(0.0),
-    np.sum: _reduction("add"), np.prod: _reduction("multiply"), np.mean: _mean, np.max: _reduction("maximum"),
-    np.min: _reduction("minimum"), np.amax: _reduction("maximum"), np.amin: _reduction("minimum"),
-    np.any: _reduction("logical_or"), np.all: _reduction("logical_and"),
-    np.real: lambda a: _parts(a, "real"), np.imag: lambda a: _parts(a, "imag"),
+    np.sum: _reduction("add"), np.prod: _reduction("multiply"), np.mean: _mean, np.any: _reduction("logical_or"),
+    np.all: _reduction("logical_and"), **dict.fromkeys((np.max, np.amax), _reduction("maximum")),
+    **dict.fromkeys((np.min, np.amin), _reduction("minimum")),
+    np.real: _parts("real"), np.imag: _parts("imag"),
     np.angle: lambda z: elementwise(lambda value: operation("atan2")(value.imag, value.real), z),
     np.asarray: lambda a, *_, **__: numbers(_plain(a)),
 }  # fmt: skip
 
 
 #: Operations of complex numbers by the names of those of real ones.
-_OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
-    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "pow": operator.pow,
-    "eq": operator.eq,
-}  # fmt: skip
+_OPERATORS = {"sub": operator.sub, "div": operator.truediv} | {
+    name: vars(operator)[name] for name in ("add", "mul", "pow", "eq")
+}
 
 
 class NumPy:
@@ -495,7 +440,7 @@ class NumPy:
     function = staticmethod(function_of_numbers)
 
     @staticmethod
-    def complex_operation(name: str, a: Any, b: Any) -> Any:
+    def complex_operation(name: str, a: object, b: object) -> Any:
         """Return an operation of a recorded and a complex number."""
         function = _OPERATORS.get(name)
         if function is None:

@@ -9,13 +9,15 @@ from __future__ import annotations
 import builtins
 import cmath
 import functools
+import inspect
 import math
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from contin.functions.kernel_parts import names_in
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import (
     FUNCTIONS,
@@ -88,7 +90,7 @@ class _Copies:
         self._kept.append(function)
         copy.__defaults__ = None if function.__defaults__ is None else tuple(map(self.value, function.__defaults__))
         copy.__kwdefaults__ = {name: self.value(value) for name, value in (function.__kwdefaults__ or {}).items()} or None
-        for name in _names(function.__code__):
+        for name in names_in(function.__code__):
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name])
             elif name in _BUILTINS:
@@ -138,8 +140,7 @@ class _Module:
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(self._module, name)
-        foreign = self._module.__name__.partition(".")[0] in _FOREIGN
-        if not foreign or isinstance(value, types.ModuleType):
+        if self._module.__name__.partition(".")[0] not in _FOREIGN or isinstance(value, types.ModuleType):
             return self._copies.value(value)
         own = _own(value)
         return value if own is None else own
@@ -156,47 +157,34 @@ _FOREIGN = ("math", "numpy", "scipy", "cmath", "builtins")
 class _Object:
     """An object of a user's class whose methods take recorded numbers."""
 
-    def __init__(self, value: Any, copies: _Copies) -> None:
-        object.__setattr__(self, "_given", (value, copies))
+    def __init__(self, value: object, copies: _Copies) -> None:
+        vars(self).update(_value=value, _copies=copies)
 
     def __getattr__(self, name: str) -> Any:
-        value, copies = object.__getattribute__(self, "_given")
-        found = getattr(value, name)
-        if isinstance(found, types.MethodType) and found.__self__ is value:
-            return types.MethodType(copies.function(found.__func__), self)
-        return copies.value(found)
+        found = getattr(self._value, name)
+        if isinstance(found, types.MethodType) and found.__self__ is self._value:
+            return types.MethodType(self._copies.function(found.__func__), self)
+        return self._copies.value(found)
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         raise Unrecordable("it changes an object")
 
-    def __call__(self, *arguments: Any, **named: Any) -> Any:
-        value, copies = object.__getattribute__(self, "_given")
-        return copies.function(type(value).__call__)(self, *arguments, **named)
+    def __call__(self, *arguments: object, **named: object) -> Any:
+        return self._copies.function(type(self._value).__call__)(self, *arguments, **named)
 
-    def __getitem__(self, key: Any) -> Any:
-        value, copies = object.__getattribute__(self, "_given")
-        return copies.value(value[key])
+    def __getitem__(self, key: object) -> Any:
+        return self._copies.value(self._value[key])
 
-    def __iter__(self) -> Any:
-        value, copies = object.__getattribute__(self, "_given")
-        return iter([copies.value(part) for part in value])
+    def __iter__(self) -> Iterator[Any]:
+        return map(self._copies.value, self._value)
 
     def __len__(self) -> int:
-        return len(object.__getattribute__(self, "_given")[0])
-
-
-def _names(code: types.CodeType) -> set[str]:
-    """Return the global names that a code object, and those inside it, may use."""
-    inner = (constant for constant in code.co_consts if isinstance(constant, types.CodeType))
-    return set(code.co_names).union(*map(_names, inner))
+        return len(self._value)
 
 
 def _catches(code: types.CodeType) -> bool:
-    return bool(getattr(code, "co_exceptiontable", b"")) and not code.co_flags & _GENERATOR
-
-
-#: The flag of generators, which always have a table of exceptions.
-_GENERATOR = 0x20
+    """Return whether a function has a table of exceptions; generators always have one."""
+    return bool(getattr(code, "co_exceptiontable", b"")) and not code.co_flags & inspect.CO_GENERATOR
 
 
 def _may_hold_functions(value: Any) -> bool:
@@ -221,7 +209,7 @@ def _own(value: Any) -> Any:
     """Return the stand-in of a function, sparse matrix or spline; None of everything else."""
     if isinstance(value, np.ufunc):
         function = UFUNCS.get(value.__name__)
-        return None if function is None else _for_all(value, function)
+        return None if function is None else _Either(value, functools.partial(elementwise, function))
     if type(value).__module__.startswith("scipy."):
         return _of_scipy(value)
     try:
@@ -234,41 +222,38 @@ def _of_scipy(value: Any) -> Any:
     """Return the stand-in of a sparse matrix, or of a spline."""
     if hasattr(value, "tocsr"):
         return SparseConstant(value)
-    if type(value).__name__ in ("CubicSpline", "PPoly", "PchipInterpolator", "Akima1DInterpolator", "CubicHermiteSpline"):
-        if np.ndim(value.c) == 2 and value.extrapolate is True:
-            return _for_all(value, tabulated(Table.piecewise(value.x, value.c)))
-    elif type(value).__name__ == "BSpline" and np.ndim(value.c) == 1 and value.extrapolate is True:
+    kind, extrapolates = type(value).__name__, getattr(value, "extrapolate", False) is True
+    if kind in ("CubicSpline", "PPoly", "PchipInterpolator", "Akima1DInterpolator", "CubicHermiteSpline"):
+        if np.ndim(value.c) == 2 and extrapolates:
+            return _Either(value, tabulated(Table.piecewise(value.x, value.c)))
+    elif kind == "BSpline" and np.ndim(value.c) == 1 and extrapolates:
         from scipy.interpolate import PPoly  # type: ignore[import-untyped]
 
         pieces = PPoly.from_spline(value)
         inside = [i for i, (a, b) in enumerate(zip(pieces.x, pieces.x[1:])) if b > a]
         knots = [*(pieces.x[i] for i in inside), pieces.x[inside[-1] + 1]]
-        return _for_all(value, tabulated(Table.piecewise(knots, pieces.c[:, inside])))
+        return _Either(value, tabulated(Table.piecewise(knots, pieces.c[:, inside])))
     return None
 
 
-def _for_all(original: Any, function: Any) -> Any:
-    """Return a function that records for recorded numbers, and is the original one for all others."""
+class _Either:
+    """A function that records for recorded numbers, and is the original one for all others."""
 
-    class _Either:
-        def __call__(self, *inputs: Any, **options: Any) -> Any:
-            if recorded(*inputs) is None:
-                return original(*inputs, **options)
-            if options.get("out") is not None or options.get("where") is not None:
-                raise Unrecordable("it calls a function of NumPy with out= or where=")
-            return elementwise(function, *inputs)
+    def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
+        self._original, self._function = original, function
 
-        def __getattr__(self, name: str) -> Any:
-            return getattr(original, name)
+    def __call__(self, *inputs: object, **options: object) -> Any:
+        if recorded(*inputs) is None:
+            return self._original(*inputs, **options)
+        if options.get("out") is not None or options.get("where") is not None:
+            raise Unrecordable("it calls a function of NumPy with out= or where=")
+        return self._function(*inputs)
 
-    return _Either()
-
-
-def _unless_recorded(original: Any, function: Any) -> Any:
-    return lambda *inputs: original(*inputs) if recorded(*inputs) is None else function(*inputs)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._original, name)
 
 
-def _most(choose: Any, original: Any) -> Any:
+def _most(choose: Callable[[Any, Any], Any], original: Callable[..., Any]) -> Callable[..., Any]:
     """Return ``max`` or ``min`` of recorded numbers: a selection, no decision."""
 
     def chosen(*values: Any, **options: Any) -> Any:
@@ -280,25 +265,20 @@ def _most(choose: Any, original: Any) -> Any:
     return chosen
 
 
-def _maker(original: Any) -> Any:
+def _maker(original: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy that makes arrays of floating-point numbers; they can hold recorded ones."""
+    converts = original in _CONVERTERS
 
     def make(*given: Any, **options: Any) -> Any:
         if recorded(*given) is not None:
-            own = FUNCTIONS.get(original)
-            if own is not None:
-                return own(*given, **options)
-            if original in (np.array, np.asarray, np.asanyarray, np.ascontiguousarray):
-                return numbers(np.array(elementwise(lambda x: x, given[0]), dtype=object))
-            array = np.empty(given[0], dtype=object)  # np.full of a recorded number
-            array[...] = given[1]
-            return array.view(Numbers)
+            if converts:
+                return numbers(np.array(given[0], dtype=object))
+            if original in FUNCTIONS:
+                return FUNCTIONS[original](*given, **options)
+            return numbers(np.broadcast_to(np.array(given[1], dtype=object), given[0]).copy())  # np.full of a recorded number
         made = original(*given, **options)
-        if original in (np.array, np.asarray, np.asanyarray, np.ascontiguousarray):
-            return made
-        kind = options.get("dtype")
-        wide = kind in (None, float, np.float64, complex, np.complex128)
-        return made.astype(object).view(Numbers) if made.dtype.kind in "fc" and wide else made
+        wide = options.get("dtype") in (None, float, np.float64, complex, np.complex128)
+        return numbers(made) if made.dtype.kind in "fc" and wide and not converts else made
 
     return make
 
@@ -309,7 +289,7 @@ class _Kind(type):
     kinds: tuple[type, ...]
     of: Callable[..., Any]
 
-    def __call__(cls, *values: Any) -> Any:
+    def __call__(cls, *values: object) -> Any:
         return cls.of(*values)
 
     def __instancecheck__(cls, value: object) -> bool:
@@ -357,19 +337,14 @@ _OF_NUMBERS |= {
     cmath.rect: lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi)),
 }  # fmt: skip
 _OF_NUMBERS |= {getattr(cmath, name): _of_complex(name) for name in COMPLEX}
+#: Functions of NumPy that make an array of what they are given, and those that make a new one.
+_CONVERTERS = (np.array, np.asarray, np.asanyarray, np.ascontiguousarray)
+_MAKERS = (np.zeros, np.empty, np.ones, np.full, np.zeros_like, np.empty_like, np.ones_like, np.full_like, *_CONVERTERS)
 #: What stands for functions that take ordinary numbers only.
-_STAND_INS: dict[Any, Any] = {original: _unless_recorded(original, own) for original, own in _OF_NUMBERS.items()}
-_STAND_INS |= {
-    max: _most(largest, max), min: _most(smallest, min),
+_STAND_INS: dict[Any, Any] = {
+    **FUNCTIONS, **{original: _Either(original, own) for original, own in _OF_NUMBERS.items()},
+    **{each: _maker(each) for each in _MAKERS}, max: _most(largest, max), min: _most(smallest, min),
     float: _Float, np.float64: _Float, complex: _Complex, np.complex128: _Complex,
 }  # fmt: skip
-_STAND_INS |= {
-    each: _maker(each)
-    for each in (
-        np.zeros, np.empty, np.ones, np.full, np.zeros_like, np.empty_like, np.ones_like, np.full_like, np.array, np.asarray,
-        np.asanyarray, np.ascontiguousarray,
-    )
-}  # fmt: skip
-_STAND_INS |= {each: own for each, own in FUNCTIONS.items() if each not in _STAND_INS and each is not np.asarray}
 #: Built-in functions that have a stand-in, by name.
-_BUILTINS = {name: _STAND_INS[getattr(builtins, name)] for name in ("max", "min", "float", "complex")}
+_BUILTINS = {each.__name__: _STAND_INS[each] for each in (max, min, float, complex)}
