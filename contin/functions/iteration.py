@@ -103,13 +103,23 @@ class Search:
         return columns
 
     def newton(self, tape: Tape, values: Mapping[Any, float]) -> list[float]:
-        """Return the unknowns at one point, for ``values`` of the inputs by slot."""
-        return newton(tape, self, values)
+        """Return the unknowns at one point, found by the interpreter, for ``values`` of the inputs by slot; nan where there
+        are none."""
+        slots, found = tape.kept(("search", self), lambda: self._program(tape))
+        point = np.array([[values[slot] for slot in slots]], dtype=float)
+        result: list[float] = evaluated(found, point, len(self.unknowns))[0].tolist()
+        return result
+
+    def _program(self, tape: Tape) -> tuple[list[Any], Program]:
+        """Return the slots of the inputs of the search, and its program."""
+        places = list(self.solution(tape, operands_of(tape, self)).values())
+        inputs = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
+        at = {slot: column for column, slot in enumerate(inputs)}
+        return inputs, program(tape, list(zip(places, range(len(places)))), Inputs(at, {}, {}))
 
     def solution(self, tape: Tape, operands: Sequence[Number]) -> dict[int, int]:
         """Return the places of the values found, by the places of the unknowns."""
-        found = [tape.apply("root", *operands, data=(self, i)) for i in range(len(self.unknowns))]
-        return {unknown: number.place for unknown, number in zip(self.unknowns, found)}
+        return {unknown: number.place for unknown, number in zip(self.unknowns, _unknowns(tape, self, operands))}
 
     def slopes_of_least(self, tape: Tape, operands: Sequence[Number]) -> list[Any]:
         """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is
@@ -171,7 +181,7 @@ def minimum(potential: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, .
     >>> round(w, 14)
     1.45616424613591
     """
-    return _found(potential, start, True)
+    return tuple(_sought(potential, start, True, _unknowns))
 
 
 def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
@@ -207,7 +217,7 @@ def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
     >>> round(value.item(), 14), round(1 / slope.item(), 13)
     (2.0, 13.0)
     """
-    return _found(residual, start, False)
+    return tuple(_sought(residual, start, False, _unknowns))
 
 
 def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
@@ -241,18 +251,14 @@ def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
     >>> round(value, 13), round(strain, 14)
     (12.0, 2.0)
     """
-    starts, function, tape = _given(potential, start)
-    if tape is None:
-        scratch = Tape(NUMPY)
-        search, found = _in_python(scratch, function, starts, True)
-        return scratch.evaluate([search.potential], {("unknown", 0, i): value for i, value in enumerate(found)})[0]
-    search, operands = recorded_search(tape, function, starts, True)
-    (value,) = tape.substitute([search.potential], search.solution(tape, operands))
-    return tape.apply("least", Number(tape, value), *operands, data=(search,))
+    return _sought(potential, start, True, _least)[0]
 
 
-def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any], Callable[..., Any], Tape | None]:
-    """Return the starts, a function of recorded numbers, and the tape on which it is recorded (None for ordinary numbers)."""
+def _sought(
+    function: Callable[..., Any], start: Sequence[Any], minimal: bool,
+    results: Callable[[Tape, Search, Sequence[Number]], list[Number]],
+) -> list[Any]:  # fmt: skip
+    """Return ``results`` of the search: recorded where one of the numbers is, else evaluated on a tape of their own."""
     starts = list(checks.sequence("start", start, "numbers"))
     for each in starts:
         if not (isinstance(each, Number) or checks.is_number(each)):
@@ -262,35 +268,35 @@ def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any
     if argument_count(checks.function("function", function)) != 1:
         raise ProblemError(f"function: {checks.shown(function)} must take 1 argument, a list of the unknowns")
     function = prepared(function)
-    return starts, function, _tape_of(function, starts)
+    tape = _tape_of(function, starts)
+    if tape is not None:
+        return results(tape, *recorded_search(tape, function, starts, minimal))
+    own = Tape(NUMPY)
+    try:
+        found = results(own, *recorded_search(own, function, starts, minimal))
+    except Unrecordable as reason:
+        raise ProblemError(f"{'potential' if minimal else 'residual'} cannot be differentiated: {reason}") from None
+    return own.evaluate([each.place for each in found], {})
 
 
-def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
-    starts, function, tape = _given(function, start)
-    if tape is None:
-        return tuple(_in_python(Tape(NUMPY), function, starts, minimal)[1])
-    search, operands = recorded_search(tape, function, starts, minimal)
-    return tuple(tape.apply("root", *operands, data=(search, i)) for i in range(len(starts)))
+def _unknowns(tape: Tape, search: Search, operands: Sequence[Number]) -> list[Number]:
+    return [tape.apply("root", *operands, data=(search, i)) for i in range(len(search.unknowns))]
+
+
+def _least(tape: Tape, search: Search, operands: Sequence[Number]) -> list[Number]:
+    (value,) = tape.substitute([search.potential], search.solution(tape, operands))
+    return [tape.apply("least", Number(tape, value), *operands, data=(search,))]
 
 
 def _tape_of(function: Callable[..., Any], starts: Sequence[Any]) -> Tape | None:
     """Return the tape on which a function is being recorded; None where all numbers are ordinary ones."""
-    known = recorded(starts)
-    if known is not None:
-        return known.tape
-    tape = Tape(NUMPY)
-    try:
-        result = function(tuple(tape.input(("probe", i)) for i in range(len(starts))))
-    except Unrecordable:
-        return _foreign(function, starts)
-    found = recorded(result)
-    return None if found is None or found.tape is tape else found.tape
-
-
-def _foreign(function: Callable[..., Any], starts: Sequence[float]) -> Tape | None:
-    """Return the tape of the numbers that a function refers to, other than its arguments."""
-    found = recorded(function(tuple(starts)))
-    return None if found is None else found.tape
+    known, scratch = recorded(starts), Tape(NUMPY)
+    if known is None:
+        try:
+            known = recorded(function(tuple(scratch.input(("probe", i)) for i in range(len(starts)))))
+        except Unrecordable:  # it refers to numbers of another tape
+            known = recorded(function(tuple(starts)))
+    return None if known is None or known.tape is scratch else known.tape
 
 
 def recorded_search(
@@ -354,31 +360,3 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
     operands.update(dict.fromkeys(place for place in search.results if not depends[place]))
     operands.update(dict.fromkeys(search.starts))
     return [Number(tape, place) for place in operands if tape.value(place) is None]
-
-
-def _in_python(tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[Search, list[float]]:
-    """Return the search on an empty tape, and the unknowns for ordinary numbers."""
-    try:
-        search, _ = recorded_search(tape, function, starts, minimal)
-    except Unrecordable as reason:
-        raise ProblemError(f"{'potential' if minimal else 'residual'} cannot be differentiated: {reason}") from None
-    return search, newton(tape, search, {})
-
-
-def newton(tape: Tape, search: Search, values: Mapping[Any, float]) -> list[float]:
-    """Return the unknowns of a search, found by the interpreter at one point; nan where it does not arrive.
-
-    ``values`` are those of the inputs by slot.
-    """
-    slots, found = tape.kept(("search", search), lambda: _program(tape, search))
-    point = np.array([[values[slot] for slot in slots]], dtype=float)
-    result: list[float] = evaluated(found, point, len(search.unknowns))[0].tolist()
-    return result
-
-
-def _program(tape: Tape, search: Search) -> tuple[list[Any], Program]:
-    """Return the slots of the inputs of a search, and its program."""
-    places = list(search.solution(tape, operands_of(tape, search)).values())
-    inputs = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
-    at = {slot: column for column, slot in enumerate(inputs)}
-    return inputs, program(tape, list(zip(places, range(len(places)))), Inputs(at, {}, {}))

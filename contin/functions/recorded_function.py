@@ -46,42 +46,36 @@ class RecordedFunction:
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
         return inspect.Signature([inspect.Parameter(name, kind) for name in self._names])
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """Return the value: recorded for recorded numbers, else computed in Python."""
-        values: list[Any] = []
-        for argument in arguments:
-            values += _flat(argument)
+        values = _flat(arguments)
         known = recorded(*values)
         if known is None:
-            slots = [self._tape.operations[place].data for place in self._inputs]
-            found: list[Any] = self._tape.evaluate(self._results, dict(zip(slots, map(float, values))))
+            found: list[Any] = self._tape.evaluate(self._results, dict(zip(self._slots(), map(float, values))))
         else:
             found = known.tape.replay(self._tape, self._results, dict(zip(self._inputs, values)))
         return found[0] if self._single else tuple(found)
 
-    def arrays(self, *arguments: Any) -> tuple[Any, ...]:
+    def arrays(self, *arguments: object) -> tuple[Any, ...]:
         """Return the values for arrays of numbers, broadcast: shape of the arguments for each."""
-        values: list[Any] = []
-        for argument in arguments:
-            values += _flat(argument)
-        slots = [self._tape.operations[place].data for place in self._inputs]
-        columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*values)]
-        found = program(
-            self._tape, list(zip(self._results, range(len(self._results)))), Inputs(dict(zip(slots, range(len(slots)))), {}, {})
-        )
+        columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*_flat(arguments))]
+        at = {slot: column for column, slot in enumerate(self._slots())}
+        found = program(self._tape, list(zip(self._results, range(len(self._results)))), Inputs(at, {}, {}))
         u = np.ascontiguousarray(np.stack([column.ravel() for column in columns], axis=1))
         out = evaluated(found, u, len(self._results))
         return tuple(np.ascontiguousarray(out.T).reshape(-1, *columns[0].shape))
 
+    def _slots(self) -> list[Any]:
+        return [self._tape.operations[place].data for place in self._inputs]
+
     def text(self) -> str:
         """Return the operations as lines of Python."""
-        return "\n".join(self._tape.lines(self._results, dict(zip(self._inputs, self._labels()))))
-
-    def _labels(self) -> list[str]:
-        labels: list[str] = []
-        for name, names in zip(self._names, self._arguments):
-            labels += [name] if names is None else [f"{name}.{each}" for each in names]
-        return labels
+        labels = [
+            label
+            for name, names in zip(self._names, self._arguments)
+            for label in ([name] if names is None else [f"{name}.{each}" for each in names])
+        ]
+        return "\n".join(self._tape.lines(self._results, dict(zip(self._inputs, labels))))
 
     def compact(self) -> RecordedFunction:
         """Return the same function on a tape of its own, which has what it needs and nothing else."""
