@@ -10,14 +10,32 @@ Functions with an ``external`` name are those of the C library in the kernel. Th
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from contin.functions.kernel_parts import helper
+
+#: Places of operands on a tape, and recorded operands.
+Places = tuple[int, ...]
+Operands = Sequence[Any]
+
+
+class Recorder(Protocol):
+    """What rules need of a `contin.functions.tape.Tape`."""
+
+    operations: list[Any]
+    decide: Callable[[int], bool] | None
+
+    def value(self, place: int) -> float | None: ...
+    def constant(self, value: float) -> int: ...
+    def at(self, name: str, places: Places, data: object = None) -> int: ...
+    def apply(self, name: str, *operands: Any, data: object = None) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -60,80 +78,68 @@ class Primitive:
 
 def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
     """Return a NumPy function of numbers after ``data``. It warns; callers silence it, once for all operations."""
-
-    def evaluate(data: Any, *operands: Any) -> float:
-        return float(function(*map(np.float64, operands)))
-
-    return evaluate
+    return lambda data, *operands: float(function(*map(np.float64, operands)))
 
 
 # --- simplifications: the value is the same; zero times a number only where it is finite, so not of what a user wrote
 # -------------------------------------------------------------
 
 
-def _simple_add(tape: Any, places: tuple[int, ...]) -> int | None:
-    a, b = places
-    if tape.value(a) == 0:
-        return b
-    if tape.value(b) == 0:
-        return a
-    for one, other in ((a, b), (b, a)):
-        operation = tape.operations[one]
-        if operation.name == "neg":
-            return int(tape.at("sub", (other, operation.operands[0])))
+def _negated(tape: Recorder, place: int) -> int | None:
+    """Return what an operation is the negative of."""
+    operation = tape.operations[place]
+    negated: int | None = operation.operands[0] if operation.name == "neg" else None
+    return negated
+
+
+def _simple_add(tape: Recorder, places: Places) -> int | None:
+    for one, other in (places, places[::-1]):
+        if tape.value(one) == 0:
+            return other
+        negated = _negated(tape, one)
+        if negated is not None:
+            return tape.at("sub", (other, negated))
     return None
 
 
-def _simple_sub(tape: Any, places: tuple[int, ...]) -> int | None:
+def _simple_sub(tape: Recorder, places: Places) -> int | None:
     a, b = places
     if tape.value(b) == 0:
         return a
     if tape.value(a) == 0:
-        return int(tape.at("neg", (b,)))
+        return tape.at("neg", (b,))
     if a == b and tape.decide is None:
-        return int(tape.constant(0.0))
-    operation = tape.operations[b]
-    return int(tape.at("add", (a, operation.operands[0]))) if operation.name == "neg" else None
+        return tape.constant(0.0)
+    negated = _negated(tape, b)
+    return None if negated is None else tape.at("add", (a, negated))
 
 
-def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
-    return _simple_times(tape, places, "mul")
-
-
-def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
-    return _simple_times(tape, places, "product")
-
-
-def _simple_times(tape: Any, places: tuple[int, ...], name: str) -> int | None:
+def _simple_times(tape: Recorder, places: Places, name: str = "mul") -> int | None:
     for one, other in (places, places[::-1]):
-        value, operation = tape.value(one), tape.operations[one]
+        value = tape.value(one)
         if value == 0 and tape.decide is None:
-            return int(tape.constant(0.0))
+            return tape.constant(0.0)
         if value == 1:
             return other
         if value == -1:
-            return int(tape.at("neg", (other,)))
-        if operation.name == "neg":
-            return int(tape.at("neg", (tape.at(name, (operation.operands[0], other)),)))
+            return tape.at("neg", (other,))
+        negated = _negated(tape, one)
+        if negated is not None:
+            return tape.at("neg", (tape.at(name, (negated, other)),))
     return None
 
 
-def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
+def _simple_div(tape: Recorder, places: Places) -> int | None:
     a, b = places
     if tape.value(b) == 1:
         return a
     if tape.value(a) == 0 and tape.decide is None:
-        return int(tape.constant(0.0))
-    operation = tape.operations[a]
-    return int(tape.at("neg", (tape.at("div", (operation.operands[0], b)),))) if operation.name == "neg" else None
+        return tape.constant(0.0)
+    negated = _negated(tape, a)
+    return None if negated is None else tape.at("neg", (tape.at("div", (negated, b)),))
 
 
-def _simple_neg(tape: Any, places: tuple[int, ...]) -> int | None:
-    operation = tape.operations[places[0]]
-    return operation.operands[0] if operation.name == "neg" else None
-
-
-def _simple_select(tape: Any, places: tuple[int, ...]) -> int | None:
+def _simple_select(tape: Recorder, places: Places) -> int | None:
     condition, a, b = places
     value = tape.value(condition)
     if value is not None:
@@ -144,18 +150,14 @@ def _simple_select(tape: Any, places: tuple[int, ...]) -> int | None:
 # --- derivatives --------------------------------------------------------------------------------------------------------------
 
 
-def _of_pow(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any]:
+def _of_pow(tape: Recorder, data: None, operands: Operands, result: Any) -> tuple[Any, Any]:
     x, y = operands
     return y * x ** (y - 1.0), tape.apply("product", result, tape.apply("log", x))
 
 
-def _of_select(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any, Any]:
+def _of_select(tape: Recorder, data: None, operands: Operands, result: Any) -> tuple[Any, Any, Any]:
     condition = operands[0]
     return None, tape.apply("select", condition, 1.0, 0.0), tape.apply("select", condition, 0.0, 1.0)
-
-
-def _of_product(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any]:
-    return operands[1], operands[0]
 
 
 def _one(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -163,7 +165,7 @@ def _one(function: Callable[..., Any]) -> Callable[..., Any]:
     return lambda tape, data, operands, result: (function(tape, operands[0], result),)
 
 
-def _none(tape: Any, data: Any, operands: Any, result: Any) -> tuple[None, ...]:
+def _none(tape: Recorder, data: object, operands: Operands, result: Any) -> tuple[None, ...]:
     return (None,) * len(operands)
 
 
@@ -202,35 +204,22 @@ def polygamma(order: int, x: float) -> float:
     return total + sign * (factorial / order + factorial / (2 * x) + tail) / x**order
 
 
-def _sum(data: Any, *operands: float) -> float:
-    total = operands[0]
-    for operand in operands[1:]:
-        total = total + operand
-    return total
+def _sum(data: None, *operands: float) -> float:
+    return functools.reduce(operator.add, operands)
 
 
-def _dot(data: Any, *operands: float) -> float:
+def _dot(data: None, *operands: float) -> float:
     half = len(operands) // 2
-    total = operands[0] * operands[half]
-    for x, y in zip(operands[1:half], operands[half + 1 :]):
-        total = total + x * y
-    return total
+    return _sum(None, *map(operator.mul, operands[:half], operands[half:]))
 
 
 def _linear(data: tuple[float, ...], *operands: float) -> float:
-    total = data[0] * operands[0]
-    for factor, operand in zip(data[1:], operands[1:]):
-        total = total + factor * operand
-    return total
+    return _dot(None, *data, *operands)
 
 
-def _of_dot(tape: Any, data: Any, operands: Any, result: Any) -> Any:
+def _of_dot(tape: Recorder, data: None, operands: Operands, result: Any) -> Operands:
     half = len(operands) // 2
     return (*operands[half:], *operands[:half])
-
-
-def _of_table(tape: Any, data: Any, operands: Any, result: Any) -> Any:
-    return (tape.apply("table", operands[0], data=data.derivative()),)
 
 
 def _operation(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: Any) -> Primitive:
@@ -280,9 +269,9 @@ TABLE: dict[str, Primitive] = {
     # arithmetic
     "add": _ufunc(np.add, lambda *_: (1.0, 1.0), simplify=_simple_add, commutes=True),
     "sub": _ufunc(np.subtract, lambda *_: (1.0, -1.0), simplify=_simple_sub),
-    "mul": _ufunc(np.multiply, lambda tape, data, xs, r: (xs[1], xs[0]), simplify=_simple_mul, commutes=True),
+    "mul": _ufunc(np.multiply, lambda tape, data, xs, r: (xs[1], xs[0]), simplify=_simple_times, commutes=True),
     "div": _ufunc(np.divide, lambda tape, data, xs, r: (1.0 / xs[1], -r / xs[1]), simplify=_simple_div),
-    "neg": _ufunc(np.negative, lambda *_: (-1.0,), simplify=_simple_neg),
+    "neg": _ufunc(np.negative, lambda *_: (-1.0,), simplify=lambda tape, places: _negated(tape, places[0])),
     # n operands: their sum; a scalar product of two halves; a sum with constant factors
     "sum": Primitive(_sum, lambda tape, data, xs, r: (1.0,) * len(xs), constant=_sum),
     "dot": Primitive(_dot, _of_dot, constant=_dot),
@@ -294,7 +283,8 @@ TABLE: dict[str, Primitive] = {
     "select": _operation(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
     # a product that is 0 where one of its factors is, also if the other one is nan or inf
     "product": _operation(
-        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_product, commutes=True, selects=True
+        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, lambda tape, data, xs, r: (xs[1], xs[0]),
+        simplify=lambda tape, places: _simple_times(tape, places, "product"), commutes=True, selects=True,
     ),
     "abs": _ufunc(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
     "sign": _ufunc(np.sign, _none),
@@ -355,7 +345,10 @@ TABLE: dict[str, Primitive] = {
     "hypot": _ufunc(np.hypot, lambda tape, data, xs, r: (xs[0] / r, xs[1] / r), "hypot"),
     "mod": _ufunc(np.mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "fmod"),
     # a piecewise polynomial; an unknown that is found by iteration; the first operand, as a minimum over such unknowns
-    "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
+    "table": Primitive(
+        lambda data, x: data.evaluate(x), lambda tape, data, xs, r: (tape.apply("table", xs[0], data=data.derivative()),),
+        constant=lambda data, x: data.evaluate(x),
+    ),
     "root": Primitive(
         lambda data, *operands: math.nan,  # `Tape.evaluate` finds it
         lambda tape, data, xs, r: data[0].partials(tape, data[1], xs),

@@ -67,8 +67,8 @@ class Tape:
         self.arrays = arrays
         self.decide: Callable[[int], bool] | None = None
         self.searches = 0  # in the present recording: names their unknowns
-        self._known: dict[Any, int] = {}
-        self._results: dict[Any, Any] = {}
+        self._known: dict[Hashable, int] = {}
+        self._results: dict[Hashable, Any] = {}
 
     def __getstate__(self) -> list[Operation]:
         """Return the operations."""
@@ -82,7 +82,7 @@ class Tape:
                 key = (operation.name, operation.data.hex() if operation.name == "constant" else operation.data)  # type: ignore[assignment]
             self._append(operation, key)
 
-    def kept(self, key: Any, make: Callable[[], Any]) -> Any:
+    def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what was made for a key before, or make it."""
         if key not in self._results:
             self._results[key] = make()
@@ -102,7 +102,7 @@ class Tape:
         operation = self.operations[place]
         return operation.data if operation.name == "constant" else None
 
-    def number(self, value: Any) -> Number:
+    def number(self, value: object) -> Number:
         """Return a Number for one of this tape or a real number.
 
         Raises
@@ -120,12 +120,12 @@ class Tape:
             return Number(self, self.constant(float(value)))
         raise Unrecordable(f"it computes with {type(value).__name__}, not with numbers")
 
-    def apply(self, name: str, *operands: Any, data: Any = None) -> Number:
+    def apply(self, name: str, *operands: object, data: object = None) -> Number:
         """Append an operation, unless it can be carried out or simplified, or is there already."""
         places = tuple(self.number(operand).place for operand in operands)
         return Number(self, self.at(name, places, data))
 
-    def at(self, name: str, places: tuple[int, ...], data: Any = None) -> int:
+    def at(self, name: str, places: tuple[int, ...], data: object = None) -> int:
         """Do the same with the places of the operands; return the place of the result."""
         primitive = primitives.TABLE[name]
         if primitive.constant is not None:
@@ -141,7 +141,7 @@ class Tape:
             places = places[::-1]
         return self._append(Operation(name, places, data), (name, places, data))
 
-    def _append(self, operation: Operation, key: Any) -> int:
+    def _append(self, operation: Operation, key: Hashable) -> int:
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = len(self.operations)
@@ -288,7 +288,7 @@ class Number:
         """Return the number itself."""
         return self
 
-    def _with(self, name: str, *operands: Any) -> Any:
+    def _with(self, name: str, *operands: object) -> Any:
         if all(isinstance(operand, _SCALARS) or _is_scalar(operand) for operand in operands):
             return self.tape.apply(name, *operands)
         if any(isinstance(operand, (complex, np.complexfloating)) for operand in operands):
@@ -314,10 +314,10 @@ class Number:
     def __rfloordiv__(self, other: object) -> Any:
         return _floor_of(self._with("div", other, self))
 
-    def __pow__(self, other: Any) -> Any:
+    def __pow__(self, other: object) -> Any:
         return power(self, other) if _is_scalar(other) else self._with("pow", self, other)
 
-    def __rpow__(self, other: Any) -> Any:
+    def __rpow__(self, other: object) -> Any:
         return power(self.tape.number(other), self) if _is_scalar(other) else self._with("pow", other, self)
 
     def __neg__(self) -> Number:
@@ -332,10 +332,10 @@ class Number:
     def __invert__(self) -> Any:
         return self.tape.apply("eq", self, 0.0)
 
-    def __and__(self, other: Any) -> Any:
+    def __and__(self, other: object) -> Any:
         return self.tape.apply("select", self, _truth(self.tape, other), 0.0)
 
-    def __or__(self, other: Any) -> Any:
+    def __or__(self, other: object) -> Any:
         return self.tape.apply("select", self, 1.0, _truth(self.tape, other))
 
     __rand__, __ror__ = __and__, __or__
@@ -360,10 +360,10 @@ class Number:
     def __ceil__(self) -> Any:
         return self.tape.apply("ceil", self)
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: object) -> Any:
         return self._arrays.universal(ufunc, method, inputs, options)
 
-    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
+    def __array_function__(self, function: Callable[..., Any], types: object, inputs: object, options: object) -> Any:
         return self._arrays.function(function, inputs, options)
 
     @property
@@ -385,7 +385,7 @@ def _floor_of(value: Any) -> Any:
     return value if value is NotImplemented else value.tape.apply("floor", value)
 
 
-def _truth(tape: Tape, value: Any) -> Number:
+def _truth(tape: Tape, value: object) -> Number:
     """Return 1 for a condition that holds, else 0."""
     return tape.apply("sub", 1.0, tape.apply("eq", value, 0.0))
 
