@@ -196,7 +196,7 @@ class Batch:
 
     def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions (as in `along`), shape (points, count, columns.width)."""
-        return self._own.evaluate(columns.request._replace(order=len(directions)), t, u, v, p, directions)[1]
+        return self._own.evaluate(Request(columns.request.inputs, len(directions)), t, u, v, p, directions)[1]
 
     def bent(self, t: Array, u: Array, v: Array, p: Array, weights: Array, direction: Array, columns: Columns) -> Array:
         """Return the gradient of w.(J d), the Hessian of w.f times d, for weights w and a direction d.
@@ -210,7 +210,7 @@ class Batch:
         -------
         ndarray, shape (points, columns.width)
         """
-        request = columns.request._replace(order=1, weighted=True)
+        request = Request(columns.request.inputs, 1, weighted=True)
         return self._own.evaluate(request, t, u, v, p, [direction, weights])[1][:, 0]
 
     def load(self, columns: Columns | None = None) -> Loaded:

@@ -613,13 +613,14 @@ def run_loaded(loaded: Loaded, p: Array, points: Points, out: Array, jac: Array)
 def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None:
     """Run a program at points (t, u, v) with parameters p; see `evaluate`. To name them, as `Points`, would take a tenth."""
     try:
-        loaded = program.rooms.pop()  # another thread has its own
+        kept = program.rooms.pop()  # another thread has its own
     except IndexError:
         loaded = load(program)
-    instructions, first, last, room, parameters = loaded
-    instructions.scalars[parameters : parameters + p.size] = p
+        kept = loaded.instructions.scalars[loaded.parameters : loaded.parameters + p.size], *loaded[:4]
+    given, instructions, first, last, room = kept
+    given[:] = p
     evaluate(instructions, first, last, points, room, out, jac)
-    program.rooms.append(loaded)
+    program.rooms.append(kept)
 
 
 def evaluated(program: Program, u: Array, count: int) -> Array:

@@ -67,7 +67,7 @@ class Recorded:
         self.kept: dict[Hashable, Any] = {}
         self._functions, self._signature = functions, signature
         self._seconds: dict[int, float] = {}  # a point takes, by the number of instructions
-        self._sizes: Array = np.empty(0)  # by which inputs and values are divided, if they are
+        self._sizes: Array | None = None  # by which inputs and values are divided, if they are
 
     def sized(self, inputs: Array, values: Array) -> Recorded:
         """Return the same functions of inputs divided by sizes, with their values divided by theirs."""
@@ -117,8 +117,8 @@ class Recorded:
         count = len(u)
         out, jac = np.empty((count, values)), np.zeros((count, *shape)) if shape else _NO_JACOBIAN
         if request.order:
-            v = np.hstack([v[:count] if self._signature.ends else u[:, :0], *given])
-        if self._sizes.size:
+            v = np.concatenate([v[:count] if self._signature.ends else u[:, :0], *given], axis=1)
+        if self._sizes is not None:
             p = np.concatenate([p, self._sizes])
         if count < _MANY:
             run(found, (t, u, v), p, out, jac)
@@ -141,7 +141,8 @@ class Recorded:
 
     def load(self, request: Request) -> Loaded:
         """Return the program as kernels run it."""
-        return load(self._made(request).program, len(self._signature.parameters), self._sizes)
+        sizes = np.empty(0) if self._sizes is None else self._sizes
+        return load(self._made(request).program, len(self._signature.parameters), sizes)
 
     def function(self, places: Sequence[int]) -> Callable[[Array, Array, Array], Array]:
         """Return the function ``(t, u, p)`` of the values of operations on the tape, shape (points, places)."""
