@@ -138,23 +138,6 @@ class Collocation(BoundaryEquations):
             largest[: self._n] = (self.largest(x)[: self._n] + 1) * self.scales.states
         return largest
 
-    def bends(self, x: Array) -> Array | None:
-        """Return by how much the second derivatives of the states jump at the inner mesh points, relative to the largest ones.
-
-        Where a solution is smooth these errors fall with the intervals; at a corner or jump of the equations they do not. None
-        where all conditions are known (`switching`): such errors tell of those in functions that are evaluated in Python only.
-        """
-        if self.problem.batch("field").interpreted is None or self.intervals < 2:
-            return None
-        matrix, local = self.basis.bends / self._h[:, None, None] ** 2, self._scaled_states(x)[self._by_interval]
-        first, last = (np.einsum("jl,jla->ja", matrix[:, end], local) for end in (0, 1))
-        least = (1 + self.largest(x)[: self._n]) / (self.mesh[-1] - self.mesh[0]) ** 2  # a trivial branch is round-off
-        sizes = np.maximum(np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0)), least)
-        found: Array = (np.abs(first[1:] - last[:-1]) / sizes).max(axis=1)
-        return found
-
-    # --- what the statement knows of its branches ----------------------------------------------------------------
-
     @property
     def is_function_of_t(self) -> bool:
         """Yes."""

@@ -34,15 +34,6 @@ class Basis:
     constant: float
 
     @functools.cached_property
-    def bends(self) -> Array:
-        """The matrix (2, d + 1) that takes nodal values to second derivatives at both ends."""
-        lagrange = 1 / np.prod(self.points[:, None] - self.points + np.eye(self.degree), axis=1)
-        slopes = interpolation(self.points, lagrange, self.nodes) @ self.slope  # at the nodes: the degree is one lower
-        slope_again = interpolation(self.points, lagrange, np.array([0.0, 1.0])) @ self.slope
-        found: Array = slope_again @ slopes
-        return found
-
-    @functools.cached_property
     def runge_kutta(self) -> Array:
         """The matrix of the Gauss method."""
         return self.integrals(self.points)

@@ -12,7 +12,6 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.index import contradiction
 from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
-from contin.events.refinement import BENT
 
 
 class Notes:
@@ -110,9 +109,4 @@ def why_lost(trial: Trial, is_located: bool) -> str:
     """Return why a special point has no label: a clause."""
     if trial.system.switching(trial.x).jumps.any():
         return "lies where the equations jump"
-    why = "was not found again on a finer mesh" if is_located else "was bracketed, and not located"
-    bends = trial.system.bends(trial.x)
-    if bends is None or not bends.max() > BENT:
-        return why
-    at = trial.system.nodes[trial.system.degree * (int(bends.argmax()) + 1)]
-    return f"{why} (the functions are evaluated in Python, and may have a corner or jump near t = {at:.4g})"
+    return "was not found again on a finer mesh" if is_located else "was bracketed, and not located"

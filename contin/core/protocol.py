@@ -175,10 +175,6 @@ class Discretization(Equations, Protocol):
         """Return the same on a mesh with those places among its points, and the carrier; None where there is no need."""
         return None
 
-    def bends(self, x: Array) -> Array | None:
-        """Return errors of second derivatives at mesh points that show corners of functions in Python; None if not known."""
-        return None
-
     # --- what a kind of problem knows of its branches; the answers here are those of a kind that knows nothing -----------
     #
     # Records that are made of systems cannot be named here: an ``arc`` is a `contin.events.arc.Arc`, a ``point`` the

@@ -24,9 +24,6 @@ from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
-#: Jumps of second derivatives at mesh points, relative to the largest, that show a corner where halving the mesh leaves more
-#: than the second number of them. Smooth solutions leave a half at degree 2, a quarter at degree 3.
-BENT, _FALLS = 1e-4, 0.7
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
 #: An error is given as no less than so many units in the last place of the largest parameter.
@@ -108,8 +105,6 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         known = steps + finding_of(found).split(system)  # a curve of branch points has one unknown more
         sizes = known[: len(system.free)] * system.free_scales
         errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
-        if finer is not None and _is_bent(trial, better):
-            return Refined(trial, dict.fromkeys(errors, np.nan), details, is_lost=True)
         if finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
             break  # such a mesh serves the estimate only
         trial, details = better, found
@@ -145,17 +140,6 @@ def _change(test: Event, trial: Trial, move: Array) -> float:
     """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
     ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
     return (ends[0] - ends[1]) / (2 * _ASIDE)
-
-
-def _is_bent(trial: Trial, better: Trial) -> bool:
-    """Return whether functions in Python have a corner or a jump: errors of second derivatives do not fall on a finer mesh.
-
-    Two meshes may agree there by chance: a corner close beside a mesh point is seen by neither.
-    """
-    first, again = trial.system.bends(trial.x), better.system.bends(better.x)
-    if first is None or again is None:
-        return False
-    return bool(again.max() > max(BENT, _FALLS * first.max()))
 
 
 def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Trial, Any, Any]:

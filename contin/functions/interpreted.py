@@ -134,7 +134,7 @@ class Interpreted:
         names = " and ".join(function.name for function in self._functions)
         how = f"differences (an estimated error of {self.error:.0e})"
         text = f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
-        warn(text, InterpretedWarning)
+        warn(f"{text}; corners and jumps in it are not seen, and errors beside them are larger than stated", InterpretedWarning)
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
