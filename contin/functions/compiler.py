@@ -24,6 +24,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.templates import Signature
 from numba.np.arrayobj import populate_array
 
 from contin.functions.kernel_parts import Helper, Instruction, Place, kernel_of, names_in
@@ -87,21 +88,13 @@ class _Passes(compiler.Compiler):
 #: Passes that look for expressions of arrays, closures, `with` and other things that kernels have not. Without them kernels are
 #: the same, and compiled in 19 of 20 parts of the time.
 _SKIPPED = (
-    "WithLifting",
-    "RewriteSemanticConstants",
-    "DeadBranchPrune",
-    "MakeFunctionToJitFunction",
-    "FindLiterallyCalls",
-    "LiteralUnroll",
-    "LiteralPropagationSubPipelinePass",
-    "InlineOverloads",
-    "NopythonRewrites",
-    "AnnotateTypes",
+    "WithLifting", "RewriteSemanticConstants", "DeadBranchPrune", "MakeFunctionToJitFunction", "FindLiterallyCalls",
+    "LiteralUnroll", "LiteralPropagationSubPipelinePass", "InlineOverloads", "NopythonRewrites", "AnnotateTypes",
     "NoPythonSupportedFeatureValidation",
-)
+)  # fmt: skip
 
 
-def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result: Any, reorder: bool) -> Any:
+def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result: types.Type | None, reorder: bool) -> Any:
     """Return what numba makes of a function for types of its parameters; it finds the type of the result where that is None."""
     options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
     flags: Any = compiler.Flags()
@@ -195,7 +188,7 @@ def _type(hint: Any) -> Any:
         raise TypeError(f"{hint!r} is no type of a kernel's argument") from None
 
 
-def _fields(hint: Any) -> list[Any]:
+def _fields(hint: object) -> list[Any]:
     """Return the annotations of a named tuple's fields."""
     return list(get_type_hints(hint, include_extras=True).values())
 
@@ -243,12 +236,12 @@ def _helper(helper: Helper) -> Any:
         return numba.njit(inline="always", **_OPTIONS)(_ready(helper.function))
     made: dict[Any, Any] = {}
 
-    def typed(context: Any, *given: Any) -> Any:
+    def typed(context: Any, *given: types.Type) -> Any:
         if given not in made:
             made[given] = _compiled(helper.function, given, None, reorder=True)
         done = made[given]
 
-        def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def call(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: list[ir.Value]) -> Any:
             context.active_code_library.add_linking_library(done.library)
             return context.call_internal_no_propagate(builder, done.fndesc, signature, arguments)[1]
 
@@ -262,13 +255,13 @@ def _outer(kernel: Any) -> Any:
     result, parameters = _signature(kernel.function)
     signature = result(*parameters)
 
-    def typed(context: Any, *given: Any) -> Any:
+    def typed(context: Any, *given: types.Type) -> Any:
         fits = [context.can_convert(kind, wanted) for kind, wanted in zip(given, parameters)]
         if len(given) != len(parameters) or any(fit is None or fit > Conversion.safe for fit in fits):
             raise numba.errors.TypingError(f"{kernel.name} takes {signature.args}, not {given}")
         return signature, call
 
-    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def call(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: list[ir.Value]) -> Any:
         kind = context.call_conv.get_function_type(result, signature.args)
         function = cgutils.get_or_insert_function(builder.module, kind, kernel.entry + INNER)
         _, value = context.call_conv.call_function(builder, function, result, signature.args, arguments)
@@ -277,7 +270,7 @@ def _outer(kernel: Any) -> Any:
     return _callable(kernel.function, typed)
 
 
-def _callable(function: Callable[..., Any], typed: Any) -> Any:
+def _callable(function: Callable[..., Any], typed: Callable[..., Any]) -> Any:
     """Return a function as numba knows it where ``typed`` gives its signature, and what writes a call of it."""
     known: Any = functools.wraps(function)(typed)
     first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(function)
@@ -300,7 +293,7 @@ def _intrinsic(instruction: Instruction) -> Any:
     nothing = result is types.void
     written: dict[str, JITCodeLibrary] = {}
 
-    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def call(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: list[ir.Value]) -> Any:
         parts = [_taken_apart(context, builder, *each) for each in zip(signature.args, arguments)]
         options = sorted(getattr(context.fastmath, "flags", ()))  # numba gives them to all sums and products of a module
         name = ".".join([write.__module__, write.__qualname__, *options, *(str(len(part)) for part in parts)])
@@ -317,7 +310,7 @@ def _intrinsic(instruction: Instruction) -> Any:
         value = builder.call(cgutils.get_or_insert_function(builder.module, kind, name), values)
         return context.get_dummy_value() if nothing else value
 
-    def _write(context: Any, function: Any, parts: list[list[Any]]) -> None:
+    def _write(context: Any, function: ir.Function, parts: list[list[ir.Value]]) -> None:
         if write.__name__ in _SMALL:
             function.attributes.add("optsize")
         builder, given = ir.IRBuilder(function.append_basic_block()), iter(function.args)
@@ -331,13 +324,13 @@ def _intrinsic(instruction: Instruction) -> Any:
             value = context.make_tuple(builder, result, value)
         builder.ret_void() if nothing else builder.ret(value)
 
-    def typed(context: Any, *given: Any) -> Any:
+    def typed(context: Any, *given: types.Type) -> Any:
         return result(*(kind if hint is Any else _type(hint) for hint, kind in zip(parameters, given))), call
 
     return numba.extending.intrinsic(functools.wraps(write)(typed))
 
 
-def _taken_apart(context: Any, builder: Any, kind: Any, argument: Any) -> list[Any]:
+def _taken_apart(context: Any, builder: ir.IRBuilder, kind: types.Type, argument: ir.Value) -> list[Any]:
     """Return what an instruction takes for an argument: the values of a named tuple, the address and strides of an array."""
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, argument)
@@ -402,7 +395,7 @@ class _Entry:
         builder.position_at_end(self.failed)
         builder.ret(ir.Constant(_POINTER, None))
 
-    def _value(self, hint: Any, given: Any) -> Any:
+    def _value(self, hint: object, given: ir.Value) -> Any:
         """Return what the compiled function takes for a Python object."""
         builder, kind = self.builder, _type(hint)
         if isinstance(kind, types.Array):
@@ -419,7 +412,7 @@ class _Entry:
         builder.position_at_end(follows)
         return value
 
-    def _array(self, kind: Any, given: Any) -> Any:
+    def _array(self, kind: types.Array, given: ir.Value) -> Any:
         """Return an array's address and shape as numba has them."""
         builder, dtype = self.builder, np.dtype(str(kind.dtype))
         self._require(builder.icmp_unsigned("==", _field(builder, given, _TYPE, _POINTER), self._own(_ARRAY)))
@@ -440,7 +433,7 @@ class _Entry:
         populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
         return array._getvalue()
 
-    def _result(self, kind: Any, value: Any) -> Any:
+    def _result(self, kind: types.Type, value: ir.Value) -> Any:
         """Return a result as a Python object."""
         if kind is types.void:
             none = self._own(_NONE)
@@ -453,19 +446,19 @@ class _Entry:
         """Return an entry of the tuple ``self``."""
         return _field(self.builder, self.function.args[0], _ENTRIES + 8 * place, _POINTER)
 
-    def _require(self, condition: Any) -> None:
+    def _require(self, condition: ir.Value) -> None:
         """Go on where a condition holds."""
         follows = self.function.append_basic_block()
         self.builder.cbranch(condition, follows, self.wrong)
         self.builder.position_at_end(follows)
 
-    def _call(self, name: str, returned: Any, *arguments: Any) -> Any:
+    def _call(self, name: str, returned: ir.Type, *arguments: ir.Value) -> Any:
         """Call a function of Python's library."""
         kind = ir.FunctionType(returned, [argument.type for argument in arguments])
         return self.builder.call(cgutils.get_or_insert_function(self.module, kind, name), arguments)
 
 
-def _linked(library: Any) -> Any:
+def _linked(library: JITCodeLibrary) -> Any:
     """Return the module of a library with all that it calls, optimized: `library.finalize()` would also make machine code."""
     for other in dict.fromkeys(library._linking_libraries):
         library._final_module.link_in(other._get_module_for_linking(), preserve=True)
@@ -494,16 +487,16 @@ _ARRAY, _NONE, _WRONG = range(3)
 _WRONG_ARGUMENTS = b"an argument of a kernel is not of the type in its annotations\0"
 
 
-def _step(builder: Any, pointer: Any, count: int) -> Any:
+def _step(builder: ir.IRBuilder, pointer: ir.Value, count: int) -> Any:
     """Return the address of a later element."""
     return builder.gep(pointer, [ir.Constant(_WORD, count)])
 
 
-def _field(builder: Any, item: Any, offset: int, kind: Any) -> Any:
+def _field(builder: ir.IRBuilder, item: ir.Value, offset: int, kind: ir.Type) -> Any:
     """Return the field of this type at an offset in bytes."""
     return builder.load(builder.bitcast(_step(builder, item, offset), kind.as_pointer()))
 
 
-def _equal(builder: Any, value: Any, number: int) -> Any:
+def _equal(builder: ir.IRBuilder, value: ir.Value, number: int) -> Any:
     """Return whether a value is a number."""
     return builder.icmp_signed("==", value, ir.Constant(value.type, number))

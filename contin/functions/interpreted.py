@@ -39,10 +39,9 @@ _TIMES = 9
 _WITHIN = 4.0
 #: Weights of f(x + k h), k = 1, 2, less those of f(x - k h), in the derivative of fourth order.
 _WEIGHTS = (8 / 12, -1 / 12)
-#: Places beside the first one where the ways to evaluate a function are compared.
-_PLACES = 3
-#: Their distance, relative to 1 + |x|.
-_ASIDE = 0.1
+#: Distances from the first place of the places where the ways to evaluate a function are compared, relative to 1 + |x|. Nearer
+#: ones would be the same for a function of their mean.
+_ASIDE = np.array([0.0, 0.02, 0.05, 0.1])
 
 
 class _Estimated(NamedTuple):
@@ -223,7 +222,8 @@ class Interpreted:
     def _takes_arrays(self, function: UserFunction, t: Array, x: Array) -> bool:
         """Return whether a function gives the same for arrays of places as for one after the other."""
         if function not in self._for_arrays:
-            places = _beside(x[:1])
+            here = np.nan_to_num(x[0])
+            places = here + np.outer(_ASIDE, 1 + np.abs(here))
             times = np.repeat(t[:1], len(places))
             try:
                 together = self._at_all(function, times, places)
@@ -255,11 +255,3 @@ class Interpreted:
             if "domain" in str(error):  # that of Python's math
                 return np.full(function.size, np.nan)
             raise
-
-
-def _beside(x: Array) -> Array:
-    """Return the place x (1, inputs) and some beside it."""
-    random = np.random.default_rng(7)
-    x = np.nan_to_num(x)
-    aside = _ASIDE * (1 + np.abs(x)) * random.uniform(0.2, 1.0, (_PLACES, x.shape[1]))
-    return np.vstack([x, x + aside])

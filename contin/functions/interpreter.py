@@ -87,29 +87,29 @@ class Widths(NamedTuple):
 class _Writer:
     """Writes the body of one case: ``d``, ``a``, ``b``, ``c`` are the numbers in the instruction's row."""
 
-    def __init__(self, builder: Any, memory: Any, widths: Any, lanes: Any) -> None:
+    def __init__(self, builder: ir.IRBuilder, memory: Memory, widths: Widths, lanes: ir.Value) -> None:
         self.builder, self.memory, self.widths, self.lanes = builder, memory, widths, lanes
         self.groups = builder.udiv(builder.add(lanes, _number(_GROUP - 1)), _number(_GROUP))
         self.d = self.a = self.b = self.c = None
 
-    def register(self, number: Any) -> Any:
+    def register(self, number: ir.Value) -> Any:
         return self.builder.add(self.memory.registers, self.builder.mul(number, _number(_REGISTER)))
 
-    def entry(self, base: Any, number: Any) -> Any:
+    def entry(self, base: ir.Value, number: ir.Value) -> Any:
         return self.builder.add(base, self.builder.mul(number, _number(8)))
 
-    def load(self, address: Any, kind: Any = _DOUBLE) -> Any:
+    def load(self, address: ir.Value, kind: ir.Type = _DOUBLE) -> Any:
         value = self.builder.load(self.builder.inttoptr(address, kind.as_pointer()))
         value.align = 8
         return value
 
-    def store(self, value: Any, address: Any) -> None:
+    def store(self, value: ir.Value, address: ir.Value) -> None:
         self.builder.store(value, self.builder.inttoptr(address, value.type.as_pointer())).align = 8
 
-    def scalar(self, number: Any) -> Any:
+    def scalar(self, number: ir.Value) -> Any:
         return self.load(self.entry(self.memory.scalars, number))
 
-    def splat(self, value: Any) -> Any:
+    def splat(self, value: ir.Value) -> Any:
         none = ir.Constant(_VECTOR, ir.Undefined)
         first = self.builder.insert_element(none, value, ir.Constant(ir.IntType(32), 0))
         return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(ir.IntType(32), _GROUP), [0] * _GROUP))
@@ -132,14 +132,14 @@ class _Writer:
             values = [self.load(self.entry(source, loop.index)) for source in sources]
             self.store(value(*values), self.entry(target, loop.index))
 
-    def gather(self, base: Any, width: Any) -> None:
+    def gather(self, base: ir.Value, width: ir.Value) -> None:
         """d = a column of an array, point by point."""
         builder = self.builder
         target = self.register(self.d)
         with for_range(builder, self.lanes) as loop:
             self.store(self.load(builder.add(base, builder.mul(loop.index, width))), self.entry(target, loop.index))
 
-    def scatter(self, base: Any, width: Any, scalar: bool) -> None:
+    def scatter(self, base: ir.Value, width: ir.Value, scalar: bool) -> None:
         """Store register or scalar a in column d of an array."""
         builder = self.builder
         base = self.entry(base, self.d)
@@ -161,11 +161,11 @@ class _Writer:
                 builder.store(builder.fadd(builder.load(total), following), total)
             self.store(builder.load(total), builder.add(target, offset))
 
-    def listed(self, number: Any) -> Any:
+    def listed(self, number: ir.Value) -> Any:
         """Return a number of the list that begins at a."""
         return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), _WORD)
 
-    def lane(self, register: Any, offset: Any) -> Any:
+    def lane(self, register: ir.Value, offset: ir.Value) -> Any:
         """Return eight lanes of a register."""
         return self.load(self.builder.add(self.register(register), offset), _VECTOR)
 
@@ -174,13 +174,13 @@ def _number(value: int) -> Any:
     return ir.Constant(_WORD, value)
 
 
-def _intrinsic(builder: Any, name: str) -> Callable[[Any], Any]:
+def _intrinsic(builder: ir.IRBuilder, name: str) -> Callable[[Any], Any]:
     full = f"llvm.{name}.v{_GROUP}f64"
     function = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), full)
     return lambda x: builder.call(function, [x])
 
 
-def _truth(builder: Any, condition: Any) -> Any:
+def _truth(builder: ir.IRBuilder, condition: ir.Value) -> Any:
     return builder.uitofp(condition, _VECTOR)
 
 
@@ -188,22 +188,22 @@ def _zeros() -> Any:
     return ir.Constant(_VECTOR, [0.0] * _GROUP)
 
 
-def _sign(builder: Any, x: Any) -> Any:
+def _sign(builder: ir.IRBuilder, x: ir.Value) -> Any:
     one, minus = (ir.Constant(_VECTOR, [value] * _GROUP) for value in (1.0, -1.0))
     below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
     return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
 
 
-def _chosen(builder: Any, condition: Any, a: Any, b: Any) -> Any:
+def _chosen(builder: ir.IRBuilder, condition: ir.Value, a: ir.Value, b: ir.Value) -> Any:
     return builder.select(builder.fcmp_unordered("!=", condition, _zeros()), a, b)
 
 
-def _product(builder: Any, x: Any, y: Any) -> Any:
+def _product(builder: ir.IRBuilder, x: ir.Value, y: ir.Value) -> Any:
     zero = builder.or_(builder.fcmp_ordered("==", x, _zeros()), builder.fcmp_ordered("==", y, _zeros()))
     return builder.select(zero, _zeros(), builder.fmul(x, y))
 
 
-def _arithmetic(builder: Any) -> dict[str, tuple[Callable[..., Any], int, int]]:
+def _arithmetic(builder: ir.IRBuilder) -> dict[str, tuple[Callable[..., Any], int, int]]:
     """Return by name: the value for eight lanes, and how many operands are registers and how many scalars."""
     add, sub, mul, div = builder.fadd, builder.fsub, builder.fmul, builder.fdiv
     found = {
@@ -222,13 +222,13 @@ def _arithmetic(builder: Any) -> dict[str, tuple[Callable[..., Any], int, int]]:
     return {**found, **{name: (_intrinsic(builder, intrinsic), 1, 0) for name, intrinsic in intrinsics.items()}}
 
 
-def _library(builder: Any, name: str) -> tuple[Callable[..., Any], int]:
+def _library(builder: ir.IRBuilder, name: str) -> tuple[Callable[..., Any], int]:
     """Return the value of a function of the C library for one lane, and the number of its operands."""
     external, count = TABLE[name].external, 2 if name in OF_TWO else 1
     kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * count)
     function = builder.module.globals.get(external) or ir.Function(builder.module, kind, external)
 
-    def value(*given: Any) -> Any:
+    def value(*given: ir.Value) -> Any:
         found = builder.call(function, given)
         if name != "mod":
             return found
@@ -244,7 +244,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
     """Return what writes each case, by name."""
     builder, memory, widths = write.builder, write.memory, write.widths
 
-    def registers(value: Any, count: int, scalars: int) -> None:
+    def registers(value: Callable[..., ir.Value], count: int, scalars: int) -> None:
         if count == 1 and scalars:
             write.vector(value, [write.a], [write.b])
         else:
@@ -253,11 +253,11 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
     def fused_scalar() -> None:
         write.vector(lambda x, z, s: builder.fadd(builder.fmul(x, s), z), [write.a, write.c], [write.b])
 
-    def linear(number: Any, offset: Any) -> Any:
+    def linear(number: ir.Value, offset: ir.Value) -> Any:
         factor = write.splat(write.scalar(write.listed(builder.add(number, write.b))))
         return builder.fmul(factor, write.lane(write.listed(number), offset))
 
-    def dot(number: Any, offset: Any) -> Any:
+    def dot(number: ir.Value, offset: ir.Value) -> Any:
         other = write.lane(write.listed(builder.add(number, write.b)), offset)
         return builder.fmul(write.lane(write.listed(number), offset), other)
 
@@ -287,7 +287,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
 
 
 @instruction
-def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
+def interpret(builder: ir.IRBuilder, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
     """Run the instructions from ``first`` to ``last``; return the number of one that is none of these, or ``last``."""
     write = _Writer(builder, memory, widths, lanes)
     place = variable(builder, first)
@@ -476,7 +476,7 @@ def _give_up(work, lists, row, lanes):
 
 
 @instruction
-def _address(builder: Any, array: Any, offset: int) -> int:
+def _address(builder: ir.IRBuilder, array: Any, offset: int) -> int:
     """Return an address in an array."""
     there: int = builder.add(array.address, offset)
     return there
@@ -559,12 +559,12 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 
 @instruction
-def _bits(builder: Any, value: float) -> int:
+def _bits(builder: ir.IRBuilder, value: float) -> int:
     return builder.bitcast(value, _WORD)  # type: ignore[no-any-return]
 
 
 @instruction
-def _number_of(builder: Any, bits: int) -> float:
+def _number_of(builder: ir.IRBuilder, bits: int) -> float:
     return builder.bitcast(bits, _DOUBLE)  # type: ignore[no-any-return]
 
 

@@ -59,21 +59,8 @@ def machine() -> tuple[str, str]:
 
 #: What LLVM calls the features that x86-64-v3 has and x86-64 has not.
 _VERSION_3 = (
-    "avx",
-    "avx2",
-    "bmi",
-    "bmi2",
-    "f16c",
-    "fma",
-    "lzcnt",
-    "movbe",
-    "popcnt",
-    "sse4.2",
-    "ssse3",
-    "cx16",
-    "sahf",
-    "xsave",
-)
+    "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "ssse3", "cx16", "sahf", "xsave",
+)  # fmt: skip
 
 
 def stored(key: str) -> Code | None:

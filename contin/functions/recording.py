@@ -21,11 +21,12 @@ from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, numbers
 from contin.functions.recorded_complex import ComplexNumber
 from contin.functions.recorded_function import RecordedFunction
-from contin.functions.signature import Arguments, Signature, UserFunction, component_count, flat
+from contin.functions.signature import PROBES, Arguments, Signature, UserFunction, component_count, flat
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Tape, Unrecordable
 
-#: Largest number of paths through the decisions of one function. Each doubles its operations at most.
+#: Largest number of paths through the decisions of one function, and of decisions on a path. A path doubles the operations at
+#: most; with ten times as many, a function of 100 operations could become one of 64,000.
 _PATHS = 64
 #: Relative difference of a tape's value from Python's beyond which a function is not recorded: the order of sums and the last
 #: bits of the C library's functions make 1e-13, cancellation ten times that.
@@ -143,7 +144,7 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
                     raise Unrecordable("its decisions are not the same when it is called again")
                 known[condition] = before[place][1] if place < len(before) else True
                 taken.append((condition, known[condition]))
-                if len(taken) > _DEPTH:
+                if len(taken) > _PATHS:
                     raise Unrecordable("it has a loop that ends by a comparison")
             return known[condition]
 
@@ -195,10 +196,6 @@ def _real(value: Any) -> Any:
     raise ProblemError("a function returns a complex number; it must return its real and its imaginary part as two numbers")
 
 
-#: Most decisions on one path.
-_DEPTH = 40
-
-
 def _sentence(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
@@ -212,7 +209,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
         They differ.
     """
     random = np.random.default_rng(11)
-    for center in _CENTERS:
+    for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1
         try:
@@ -226,10 +223,6 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
         scale = 1 + np.abs(expected[known]).max(initial=0.0)
         if np.any(np.abs(computed[known] - expected[known]) > _AGREES * scale):
             raise Unrecordable("its values are not those of its recording")
-
-
-#: Places around which functions are compared: positive and negative numbers.
-_CENTERS = (0.5, 1.5, -0.5)
 
 
 def function_of(function: Function, arguments: Arguments) -> RecordedFunction:

@@ -219,7 +219,7 @@ def _returned(function: Function, arguments: Arguments, arrays: bool, what: str)
     """Return how many values a call returns, with states as named tuples or as arrays; parameters, the last, are named."""
     plain = getattr(function, "py_func", function)
     first: Exception | None = None
-    for number in _PROBES:
+    for number in PROBES:
         numbers = [number + 0.01 * i for names in arguments for i in range(component_count(names))]
         try:
             with np.errstate(all="ignore"):
@@ -237,4 +237,4 @@ def _returned(function: Function, arguments: Arguments, arrays: bool, what: str)
 
 #: Numbers with which functions are called to see what they return: in the domain of most functions. NaN, the last, is in the
 #: domain of all, but a search may not end for it.
-_PROBES = (0.5, 1.5, -0.5, 0.0, 10.0, math.nan)
+PROBES = (0.5, 1.5, -0.5, 0.0, 10.0, math.nan)
