@@ -77,10 +77,7 @@ class Tape:
     def __setstate__(self, operations: list[Operation]) -> None:
         self.__init__()  # type: ignore[misc]
         for operation in operations:
-            key = (operation.name, operation.operands, operation.data)
-            if operation.name in ("constant", "input"):
-                key = (operation.name, operation.data.hex() if operation.name == "constant" else operation.data)  # type: ignore[assignment]
-            self._append(operation, key)
+            self._append(operation)
 
     def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what was made for a key before, or make it."""
@@ -90,12 +87,11 @@ class Tape:
 
     def input(self, slot: Hashable) -> Number:
         """Return the number of this input; whole slots are those of u, v and p in order."""
-        return Number(self, self._append(Operation("input", (), slot), ("input", slot)))
+        return Number(self, self._append(Operation("input", (), slot)))
 
     def constant(self, value: float) -> int:
         """Return the place of a constant."""
-        value = float(value)
-        return self._append(Operation("constant", (), value), ("constant", value.hex()))
+        return self._append(Operation("constant", (), float(value)))
 
     def value(self, place: int) -> float | None:
         """Return the value of a constant, None of another operation."""
@@ -114,10 +110,10 @@ class Tape:
             if value.tape is not self:
                 raise Unrecordable("it uses a number of another recording")
             return value
+        if isinstance(value, (float, int, numbers.Real, np.bool_)):
+            return Number(self, self.constant(float(value)))
         if isinstance(value, np.ndarray) and value.ndim == 0:
             return self.number(value.item())
-        if isinstance(value, (numbers.Real, np.bool_)):
-            return Number(self, self.constant(float(value)))
         raise Unrecordable(f"it computes with {type(value).__name__}, not with numbers")
 
     def apply(self, name: str, *operands: object, data: object = None) -> Number:
@@ -139,9 +135,10 @@ class Tape:
                 return simpler
         if primitive.commutes and places[0] > places[1]:
             places = places[::-1]
-        return self._append(Operation(name, places, data), (name, places, data))
+        return self._append(Operation(name, places, data))
 
-    def _append(self, operation: Operation, key: Hashable) -> int:
+    def _append(self, operation: Operation) -> int:
+        key = operation.data.hex() if operation.name == "constant" else operation  # 0 and -0 are two, nan is one
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = len(self.operations)
@@ -184,63 +181,51 @@ class Tape:
 
     def replay(self, other: Tape, places: Sequence[int], values: Mapping[int, Any]) -> list[Number]:
         """Return operations of another tape, carried out on this one with ``values`` of its inputs by place."""
-        moved = {place: self.number(value).place for place, value in values.items()}
+        moved: dict[Any, Any] = {place: self.number(value).place for place, value in values.items()}
         self._replay(other, places, moved)
         return [Number(self, moved[place]) for place in places]
 
-    def _replay(self, other: Tape, places: Sequence[int], moved: dict[int, int]) -> None:
+    def _replay(self, other: Tape, places: Sequence[int], moved: dict[Any, Any]) -> None:
+        """Put operations of another tape on this one: ``moved`` are their places here, and searches as they are here."""
         for place in other.needed(places):
             if place in moved:
                 continue
-            operation = other.operations[place]
-            if operation.name == "constant":
-                moved[place] = self.constant(operation.data)
+            name, operands, data = other.operations[place]
+            if name == "constant":
+                moved[place] = self.constant(data)
                 continue
-            data = operation.data
-            if operation.name in ("root", "least"):
+            if name in ("root", "least"):
                 data = (self._moved_search(other, data[0], moved), *data[1:])
-            moved[place] = self.at(operation.name, tuple(moved[operand] for operand in operation.operands), data)
+            moved[place] = self.at(name, tuple(moved[operand] for operand in operands), data)
 
-    def _moved_search(self, other: Tape, search: Any, moved: dict[int, int]) -> Any:
+    def _moved_search(self, other: Tape, search: Any, moved: dict[Any, Any]) -> Any:
         """Return a search of another tape with places on this one."""
-        if ("search", search) not in moved:  # type: ignore[comparison-overlap]
+        if search not in moved:
             inner = dict(moved)
             for number, unknown in enumerate(search.unknowns):
                 inner[unknown] = self.input(("unknown", self.searches, number)).place
             self.searches += 1
             self._replay(other, [*search.results, *search.starts], inner)
-            moved["search", search] = search.moved(inner)  # type: ignore[index]
-        return moved["search", search]  # type: ignore[index]
+            moved[search] = search.moved(inner)
+        return moved[search]
 
     def evaluate(self, places: Sequence[int], values: Mapping[Any, float]) -> list[float]:
         """Return the values of operations in Python, for ``values`` of the inputs by slot."""
         found: dict[int, Any] = {}
         with np.errstate(all="ignore"):
-            self._evaluate(found, self.needed(places), values)
+            for place in self.needed(places):
+                name, operands, data = self.operations[place]
+                if name in ("input", "constant"):
+                    found[place] = data if name == "constant" else values[data]
+                elif name == "root":
+                    found[place] = data[0].newton(self, values)[data[1]]
+                else:
+                    found[place] = primitives.TABLE[name].evaluate(data, *(found[operand] for operand in operands))
         return [float(found[place]) for place in places]
-
-    def _evaluate(self, found: dict[int, Any], needed: Iterable[int], values: Mapping[Any, float]) -> None:
-        for place in needed:
-            operation = self.operations[place]
-            if operation.name == "input":
-                found[place] = values[operation.data]
-            elif operation.name == "constant":
-                found[place] = operation.data
-            elif operation.name == "root":
-                found[place] = self._unknown(operation, values)
-            else:
-                evaluate = primitives.TABLE[operation.name].evaluate
-                found[place] = evaluate(operation.data, *(found[operand] for operand in operation.operands))
 
     def lines(self, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
         """Return operations as lines of text, with ``labels`` of inputs by place; what is used once stands where it is used."""
         return _lines(self, places, labels)
-
-    def _unknown(self, operation: Operation, values: Mapping[Any, float]) -> float:
-        """Return an unknown that is found by iteration."""
-        search, index = operation.data
-        found: float = search.newton(self, values)[index]
-        return found
 
 
 def _binary(name: str) -> Any:
