@@ -14,7 +14,7 @@ left to compiled Python: piecewise polynomials, polygamma functions, and unknown
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +35,8 @@ from contin.functions.kernel_parts import (
     variable,
 )
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
-from contin.functions.program import CODES, Program
+from contin.functions.program import CODES, Inputs, Program, program
+from contin.functions.tape import Tape
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
 #: twice as often.
@@ -623,11 +624,16 @@ def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None
     program.rooms.append(kept)
 
 
-def evaluated(program: Program, u: Array, count: int) -> Array:
-    """Return the ``count`` values of a program whose inputs are columns of u (points, n), shape (points, count)."""
-    out, none = np.empty((len(u), count)), np.empty((0, 0))
-    run(program, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
-    return out
+def of_columns(tape: Tape, places: Sequence[int], slots: Sequence[Hashable]) -> Callable[[Array], Array]:
+    """Return the function that takes inputs as columns (points, slots) to the values of operations (points, places)."""
+    found = program(tape, list(zip(places, range(len(places)))), Inputs({slot: k for k, slot in enumerate(slots)}, {}, {}))
+
+    def values(u: Array) -> Array:
+        out, none = np.empty((len(u), len(places))), np.empty((0, 0))
+        run(found, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
+        return out
+
+    return values
 
 
 #: Factors of the hash, as in `contin.functions.round_off.move`, as signed numbers; the smallest number of full precision.

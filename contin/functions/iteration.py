@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from contin import checks
+from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.functions import derivatives
-from contin.functions.interpreter import evaluated
-from contin.functions.program import Inputs, Program, program
+from contin.functions.interpreter import of_columns
 from contin.functions.recorded_arrays import NUMPY, recorded, select
 from contin.functions.recording import recorded_paths
 from contin.functions.signature import argument_count
@@ -105,17 +105,15 @@ class Search:
     def newton(self, tape: Tape, values: Mapping[Any, float]) -> list[float]:
         """Return the unknowns at one point, found by the interpreter, for ``values`` of the inputs by slot; nan where there
         are none."""
-        slots, found = tape.kept(("search", self), lambda: self._program(tape))
-        point = np.array([[values[slot] for slot in slots]], dtype=float)
-        result: list[float] = evaluated(found, point, len(self.unknowns))[0].tolist()
+        slots, found = tape.kept(("search", self), lambda: self._function(tape))
+        result: list[float] = found(np.array([[values[slot] for slot in slots]], dtype=float))[0].tolist()
         return result
 
-    def _program(self, tape: Tape) -> tuple[list[Any], Program]:
-        """Return the slots of the inputs of the search, and its program."""
+    def _function(self, tape: Tape) -> tuple[list[Any], Callable[[Array], Array]]:
+        """Return the slots of the inputs of the search, and the function that takes their values to the unknowns."""
         places = list(self.solution(tape, operands_of(tape, self)).values())
-        inputs = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
-        at = {slot: column for column, slot in enumerate(inputs)}
-        return inputs, program(tape, list(zip(places, range(len(places)))), Inputs(at, {}, {}))
+        slots = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
+        return slots, of_columns(tape, places, slots)
 
     def solution(self, tape: Tape, operands: Sequence[Number]) -> dict[int, int]:
         """Return the places of the values found, by the places of the unknowns."""

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.functions.interpreter import evaluated
-from contin.functions.program import Inputs, program
+from contin.functions.interpreter import of_columns
 from contin.functions.recorded_arrays import NUMPY, recorded
 from contin.functions.signature import Arguments
 from contin.functions.tape import Tape
@@ -59,10 +58,8 @@ class RecordedFunction:
     def arrays(self, *arguments: object) -> tuple[Any, ...]:
         """Return the values for arrays of numbers, broadcast: shape of the arguments for each."""
         columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*_flat(arguments))]
-        at = {slot: column for column, slot in enumerate(self._slots())}
-        found = program(self._tape, list(zip(self._results, range(len(self._results)))), Inputs(at, {}, {}))
         u = np.ascontiguousarray(np.stack([column.ravel() for column in columns], axis=1))
-        out = evaluated(found, u, len(self._results))
+        out = of_columns(self._tape, self._results, self._slots())(u)
         return tuple(np.ascontiguousarray(out.T).reshape(-1, *columns[0].shape))
 
     def _slots(self) -> list[Any]:
