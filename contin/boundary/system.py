@@ -138,6 +138,8 @@ class Collocation(BoundaryEquations):
             largest[: self._n] = (self.largest(x)[: self._n] + 1) * self.scales.states
         return largest
 
+    # --- what the statement knows of its branches ----------------------------------------------------------------
+
     @property
     def is_function_of_t(self) -> bool:
         """Yes."""
