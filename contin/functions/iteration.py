@@ -259,7 +259,8 @@ def _sought(
     """Return ``results`` of the search: recorded where one of the numbers is, else evaluated on a tape of their own."""
     starts = list(checks.sequence("start", start, "numbers"))
     for each in starts:
-        if not (isinstance(each, Number) or checks.is_number(each)):
+        plain = each[()] if isinstance(each, np.ndarray) and each.ndim == 0 else each  # as np.where gives of numbers
+        if not (isinstance(plain, Number) or checks.is_number(plain)):
             raise ProblemError(f"start: {checks.shown(each)} must be a number")
     if not 1 <= len(starts) <= _MOST:
         raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
