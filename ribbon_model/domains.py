@@ -98,14 +98,16 @@ class Domain:
         """Return the collocation system on a uniform mesh."""
         return Collocation(self.problem(law), np.linspace(0, 1, intervals + 1), degree, self.free, parameters)
 
-    def circle(self, system: Collocation, m: int, kappa_n: float, moment: float | None = None) -> np.ndarray:
-        """The unknowns of the planar m-covered circle, shape (system.size,); its moment is m - kappa_n if it is not given."""
-        half_angle = m * system.parameters[list(system.problem.parameters).index("length")] * system.nodes / 2
+    def circle(self, system: Collocation, m: int, kappa_n: float) -> np.ndarray:
+        """Return the unknowns of the planar m-covered circle of the law, shape (system.size,)."""
+        known, law = dict(zip(system.problem.parameters, system.parameters)), system.problem.law
+        half_angle = m * known["length"] * system.nodes / 2
         zero = np.zeros_like(half_angle)
         states = [np.cos(half_angle), np.sin(half_angle), zero, zero]
         if "x1" in system.problem.states:
             states += [zero, (np.cos(2 * half_angle) - 1) / m, np.sin(2 * half_angle) / m]
-        values = dict.fromkeys(system.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n if moment is None else moment}
+        moment = law.circle(m, kappa_n, {name: float(known[name]) for name in law.parameters})["M1"]
+        values = dict.fromkeys(system.free, 0.0) | {"kappa_n": kappa_n, "M1": moment}
         return system.pack(np.array(states).T, values)
 
     def __repr__(self) -> str:

@@ -53,7 +53,7 @@ def unit(what: str, vector) -> Vector:
     return tuple(value / length for value in values)  # type: ignore[return-value]
 
 
-@dataclass(frozen=True)
+@dataclass(unsafe_hash=True)  # the fields are normalised when it is made, and then left as they are
 class End:
     """What is held at an end.
 
@@ -84,8 +84,8 @@ class End:
 
         if self.rotation not in (CLAMPED, HINGED, JOINT, FREE):
             raise ValueError(f"rotation: {self.rotation!r} must be clamped, hinged, joint or free")
-        object.__setattr__(self, "axis", unit("axis", self.axis))
-        object.__setattr__(self, "held", tuple(unit("held", vector) for vector in self.held))
+        self.axis = unit("axis", self.axis)
+        self.held = tuple(unit("held", vector) for vector in self.held)
         if len(self.held) and np.linalg.matrix_rank(np.array(self.held), tol=1e-6) < len(self.held):
             raise ValueError(f"held: the {len(self.held)} directions repeat each other; give independent ones, at most three")
         if self.rotation == JOINT and abs(self.axis[self.director]) > 1 - 1e-6:

@@ -25,7 +25,7 @@ PHASES = {
 _FEWEST, _MOST = 20, 100
 
 
-@dataclass(frozen=True)
+@dataclass(unsafe_hash=True)  # the direction is normalised when it is made, and then left as it is
 class Roller:
     """A support between the ends, which holds the place of one point of the strip along a direction.
 
@@ -51,7 +51,7 @@ class Roller:
     direction: ends.Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", ends.unit("roller", self.direction))
+        self.direction = ends.unit("roller", self.direction)
         if not 0 < self.at < 1 or self.intervals() == 0:
             raise ValueError(f"roller: at: {self.at:g} must be a multiple of 1/N between 0 and 1, with N up to {_MOST}")
 

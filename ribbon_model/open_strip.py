@@ -41,7 +41,7 @@ _ZERO = 1e-10
 _MOST_PHASES = 2
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(repr=False)  # the directions are normalised when it is made, and then left as they are
 class OpenStrip(Shown):
     """A strip between two ends.
 
@@ -91,8 +91,9 @@ class OpenStrip(Shown):
     roller: Roller | None = None
 
     def __post_init__(self) -> None:
-        for name in ("weight_direction", "foundation_direction", "stroke_direction"):
-            object.__setattr__(self, name, ends.unit(name, getattr(self, name)))
+        self.weight_direction = ends.unit("weight_direction", self.weight_direction)
+        self.foundation_direction = ends.unit("foundation_direction", self.foundation_direction)
+        self.stroke_direction = ends.unit("stroke_direction", self.stroke_direction)
         ends.check_known(self.numbers, self.known)
         for name, value in self.numbers.items():
             if not math.isfinite(value):

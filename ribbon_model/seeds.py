@@ -49,9 +49,9 @@ def primary_branch(
     """
     if m % n == 0 and (m // n) % 2 == 0:
         raise ValueError(f"m = {m}, n = {n}: with m / n even the symmetry of the mode does not close the loop")
-    kappa_n = thresholds(law, m, n, parameters)[root]
+    kappa_n = _start(law, m, n, parameters, root)
     system = CELL.discretize(law, intervals, degree, law.values(parameters) | CELL.wave(m, n, kappa_n))
-    return leave_circle(system, CELL.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, parameters)))
+    return leave_circle(system, CELL.circle(system, m, kappa_n))
 
 
 @takes_parameters
@@ -67,19 +67,20 @@ def half_loop_branch(
     >>> round(float(x[system.parameter_index("kappa_n")]), 9)
     2.5
     """
-    kappa_n = thresholds(law, m, n, parameters)[root]
+    kappa_n = _start(law, m, n, parameters, root)
     system = HALF_LOOP.discretize(law, intervals, degree, law.values(parameters))
-    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, parameters)))
+    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n))
 
 
-def _moment(law: Law, m: int, n: int, kappa_n: float, parameters: float | Mapping[str, float]) -> float:
-    """Return the moment of a circle where its branch begins.
+def _start(law: Law, m: int, n: int, parameters: float | Mapping[str, float], root: int) -> float:
+    """Return kappa_n of the circle where a branch begins.
 
     Raises
     ------
     TwoBendings
-        The law has another bending for it.
+        The law has another bending for its moment.
     """
+    kappa_n = thresholds(law, m, n, parameters)[root]
     moment: float = circle(law, m, kappa_n, parameters)["M1"]
     bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(parameters).values())[0][0, 0]
     if not abs(bending - m) < _SAME_BENDING * m:
@@ -87,7 +88,7 @@ def _moment(law: Law, m: int, n: int, kappa_n: float, parameters: float | Mappin
             f"m = {m}, n = {n}: the strain energy of the circle where the branch begins, at kappa_n = {kappa_n:.6g}, has two "
             f"minima, and the law {law.name!r} takes the other one; it holds for smaller n"
         )
-    return moment
+    return kappa_n
 
 
 def leave_circle(system: Collocation, circle: np.ndarray):

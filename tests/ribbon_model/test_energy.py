@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from half_loop_energy import variational_problem
 
 import contin
 from ribbon_model import exact
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES
-from ribbon_model.energy import variational_problem
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FINITE_WIDTH, PAPER_LAWS, RIBBON
 from ribbon_model.linear import thresholds

@@ -192,7 +192,7 @@ def test_thresholds_from_the_flat_rod_to_the_ribbon():
 @pytest.mark.full
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})
-    start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, wide(10.0))["M1"])
+    start = HALF_LOOP.circle(system, 1, 2.0)
     found = trace(point_of(system, start), Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
     expected = [thresholds(FINITE_WIDTH, 1, n, wide(10.0))[0] for n in (2, 3)]
     assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)

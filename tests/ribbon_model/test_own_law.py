@@ -142,7 +142,7 @@ def test_a_primary_branch_against_its_quadrature(branch):
 
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(LAW, 12, 6, NUMBERS)
-    start = HALF_LOOP.circle(system, 1, 1.0, circle(LAW, 1, 1.0, NUMBERS)["M1"])
+    start = HALF_LOOP.circle(system, 1, 1.0)
     expected = [threshold(1, n) for n in (2, 3)]
     found = contin.trace(point_of(system, start), limits={"kappa_n": (0, expected[1] + 0.5)}).labelled("BP")
     assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)
