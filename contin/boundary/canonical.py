@@ -98,12 +98,7 @@ def _named(names: Sequence[str], values: Sequence[Any]) -> Any:
 
 
 def _called(tape: Tape, what: str, function: Function, arguments: Sequence[Any], count: int | None = None) -> list[Number]:
-    """Return the values of a user's function; ``count`` many of them.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the values of a user's function; ``count`` many of them."""
 
     def call(copy: Any) -> Sequence[Any]:
         result = copy(*arguments)
@@ -126,6 +121,13 @@ def _called(tape: Tape, what: str, function: Function, arguments: Sequence[Any],
         if value.known is not None and math.isinf(value.known):
             raise ProblemError(f"{what} has no finite real value: {value.known}")
     return found
+
+
+def _derivatives(tape: Tape, values: Sequence[Number], by: Sequence[Number]) -> list[list[Number]]:
+    """Return the derivatives of values (rows) by inputs."""
+    places = derivatives.jacobian(tape, [value.place for value in values], [each.place for each in by])
+    zero = tape.constant(0.0)
+    return [[Number(tape, places.get((i, j), zero)) for j in range(len(by))] for i in range(len(values))]
 
 
 class _Inside:
@@ -157,13 +159,7 @@ class _Inside:
 
     def _slopes(self, value: Number, by: Sequence[Number]) -> list[Number]:
         """Return the gradient of a value."""
-        return self._derivatives([value], by)[0]
-
-    def _derivatives(self, values: Sequence[Number], by: Sequence[Number]) -> list[list[Number]]:
-        """Return the derivatives of values (rows) by inputs."""
-        places = derivatives.jacobian(self.tape, [value.place for value in values], [each.place for each in by])
-        zero = self.tape.constant(0.0)
-        return [[Number(self.tape, places.get((i, j), zero)) for j in range(len(by))] for i in range(len(values))]
+        return _derivatives(self.tape, [value], by)[0]
 
     def _from_hamiltonian(self) -> None:
         v = self.variation
@@ -193,7 +189,7 @@ class _Inside:
             convex = convex + mu * value
         self.forces = self._slopes(convex, self.x)
         slopes = self._slopes(convex, self.w)
-        second = self._derivatives(slopes, self.w)
+        second = _derivatives(tape, slopes, self.w)
         self._check(second)
         if any(self._reads(entry, self.w) for row in second for entry in row):
             controls = self._searched(convex)
@@ -307,7 +303,7 @@ class _Ends:
         self.conditions = [] if v.ends is None else _called(tape, "ends", v.ends, given)
         energy = [] if v.end_energy is None else _called(tape, "end_energy", v.end_energy, given, 1)
         self.places = [*self.a[:n], *self.b[:n]]
-        self.slopes = self._slopes(self.conditions)
+        self.slopes = _derivatives(tape, self.conditions, self.places)
         self._check()
         fixed: tuple[list[int], list[int]] = ([], [])
         free = []
@@ -325,17 +321,11 @@ class _Ends:
         sigma = [tape.input(4 * n + len(self.p) + i) for i in range(len(free))]
         self.p += sigma
         potential = sum((s * condition for s, condition in zip(sigma, free)), energy[0] if energy else tape.number(0.0))
-        by = self._slopes([potential])[0]
+        (by,) = _derivatives(tape, [potential], self.places)
         starting, ending = self.a[n:], self.b[n:]
         self.values = [*self.conditions]
         self.values += [starting[i] - by[i] for i in range(n) if i not in fixed[0]]
         self.values += [ending[i] + by[n + i] for i in range(n) if i not in fixed[1]]
-
-    def _slopes(self, values: Sequence[Number]) -> list[list[Number]]:
-        """Return the derivatives of values by the states at both ends."""
-        places = derivatives.jacobian(self.tape, [value.place for value in values], [each.place for each in self.places])
-        zero = self.tape.constant(0.0)
-        return [[Number(self.tape, places.get((i, j), zero)) for j in range(len(self.places))] for i in range(len(values))]
 
     def _check(self) -> None:
         """Raise ProblemError for end conditions without a state, and for those linear ones that depend on others."""

@@ -22,10 +22,9 @@ intervals are joined in the same way, as long as that holds. What is left is a s
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -149,15 +148,20 @@ def _convexity(hll: Array) -> float:
     return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + _NO_CONTROL if np.all(largest > 0) else -1.0
 
 
-def degeneracy(system: Collocation, x: Array) -> str:
-    """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found."""
+def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
+    """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found.
+
+    At a solution only conditions can do so that repeat or contradict each other.
+    """
+    if not solved and not np.isfinite(system.functionals(x)).all():
+        return "energy: it has no finite value there"
     try:
-        if not np.isfinite(system.functionals(x)).all():
-            return "energy: it has no finite value there"
         found = second_variation(system, x)
     except ProblemError as error:
         return str(error)
     except np.linalg.LinAlgError:
+        return ""
+    if solved:
         return ""
     if found is None:
         return "energy: it is not convex in the controls there (Legendre's condition)"
@@ -169,25 +173,13 @@ def degeneracy(system: Collocation, x: Array) -> str:
     return ""
 
 
-def dependent_conditions(system: Collocation, x: Array) -> str:
-    """Return that conditions of a variational problem repeat or contradict each other at a solution x; "" if not."""
-    try:
-        second_variation(system, x)
-    except ProblemError as error:
-        return str(error)
-    except np.linalg.LinAlgError:
-        pass
-    return ""
-
-
 #: A mode keeps a symmetry that maps it to itself up to this part of its size, and breaks one that does not.
 _KEEPS = 1e-4
 #: Places at which a mode and its image are compared.
 _PLACES = 101
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
+class _Pieces(NamedTuple):
     """Pieces of the domain, one after the other: arrays with a first axis over pieces, as drawn above."""
 
     phi: Array  # (K, n, n)
@@ -196,16 +188,15 @@ class _Pieces:
     g: Array  # (K, c, n + m)
 
 
-@dataclass(frozen=True, eq=False)
-class _Recovery:
+class _Recovery(NamedTuple):
     """How pieces came out of those before: y = turn [kept, rest], rest = -inside (x, kept); ``pairs``: these are two pieces.
 
-    ``phi`` and ``b`` lead from one of the two to the other, ``count`` is the number of pieces before.
+    ``phi`` and ``b`` lead from one of the two to the other, ``pieces`` is the number of pieces before.
     """
 
     turn: Array
     inside: Array
-    count: int
+    pieces: int
     phi: Array | None = None
     b: Array | None = None
 
@@ -218,11 +209,10 @@ class _Recovery:
         first, second = np.split(whole, 2, axis=1)
         middle = np.einsum("kij,kj->ki", self.phi, x) + np.einsum("kij,kj->ki", self.b, first)
         starts, ys = np.stack([x, middle], 1), np.stack([first, second], 1)
-        return starts.reshape(-1, x.shape[1])[: self.count], ys.reshape(-1, first.shape[1])[: self.count]
+        return starts.reshape(-1, x.shape[1])[: self.pieces], ys.reshape(-1, first.shape[1])[: self.pieces]
 
 
-@dataclass(frozen=True, eq=False)
-class _Profile:
+class _Profile(NamedTuple):
     """dx as a function of t from the unknowns (x of the first end, all y)."""
 
     mesh: Array
@@ -330,17 +320,13 @@ def _roots(hll: Array) -> tuple[Array, Array] | None:
 
 def _joined(pieces: _Pieces) -> tuple[_Pieces, tuple[_Recovery, ...]]:
     """Return the pieces joined in pairs as long as possible, and the way back."""
-    recoveries = []
-    condensed, recovery = _condensed(pieces)
-    if recovery is not None:
-        pieces = condensed
-        recoveries.append(recovery)
+    pieces, recovery = _condensed(pieces)
+    recoveries = [] if recovery is None else [recovery]
     while len(pieces.phi) > 1:
         joined, recovery = _condensed(_pairs(pieces))
         if recovery is None:
             break
-        phi, b = pieces.phi[::2], pieces.b[::2]
-        recoveries.append(dataclasses.replace(recovery, phi=phi, b=b, count=len(pieces.phi)))
+        recoveries.append(recovery._replace(phi=pieces.phi[::2], b=pieces.b[::2], pieces=len(pieces.phi)))
         pieces = joined
     return pieces, tuple(recoveries)
 
@@ -349,10 +335,10 @@ def _pairs(pieces: _Pieces) -> _Pieces:
     """Return neighbouring pieces joined; of an odd number, the last is joined with one of length zero."""
     n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
     if len(pieces.phi) % 2:
-        nothing = _Pieces(np.eye(n)[None], np.zeros((1, n, m)), _only_square(n, m), np.zeros((1, c, n + m)))
-        pieces = _Pieces(*(np.concatenate([getattr(pieces, f), getattr(nothing, f)]) for f in ("phi", "b", "q", "g")))
-    first = _Pieces(*(getattr(pieces, f)[::2] for f in ("phi", "b", "q", "g")))
-    second = _Pieces(*(getattr(pieces, f)[1::2] for f in ("phi", "b", "q", "g")))
+        square = np.diag(np.repeat([0.0, 1.0], [n, m]))
+        nothing = _Pieces(np.eye(n)[None], np.zeros((1, n, m)), square[None], np.zeros((1, c, n + m)))
+        pieces = _Pieces(*map(np.concatenate, zip(pieces, nothing)))
+    first, second = (_Pieces(*(array[start::2] for array in pieces)) for start in (0, 1))
     count = len(first.phi)
     middle = np.zeros((count, n + m, n + 2 * m))  # (x, y) of the second piece from (x, y, y) of the joined one
     middle[:, :n, :n], middle[:, :n, n : n + m] = first.phi, first.b
@@ -365,12 +351,6 @@ def _pairs(pieces: _Pieces) -> _Pieces:
     return _Pieces(second.phi @ first.phi, b, q, g)
 
 
-def _only_square(n: int, m: int) -> Array:
-    q = np.zeros((1, n + m, n + m))
-    q[0, range(n, n + m), range(n, n + m)] = 1.0
-    return q
-
-
 def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
     """Return pieces with those y that matter outside; the same where the others are not well positive, or none."""
     n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
@@ -380,8 +360,7 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
     outward = np.concatenate([pieces.b, pieces.g[:, :, n:]], axis=1)
     sizes = np.linalg.norm(outward, axis=2, keepdims=True)
     turn: Any = np.linalg.qr((outward / np.where(sizes > 0, sizes, 1.0)).swapaxes(1, 2), mode="complete")[0]
-    whole = np.zeros((len(pieces.phi), n + m, n + m))
-    whole[:, range(n), range(n)] = 1.0
+    whole = np.tile(np.eye(n + m), (len(pieces.phi), 1, 1))
     whole[:, n:, n:] = turn
     q = whole.swapaxes(1, 2) @ pieces.q @ whole
     inner = q[:, n + kept :, n + kept :]

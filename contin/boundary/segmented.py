@@ -196,12 +196,7 @@ class SegmentedProblem(BoundaryValueProblem):
 
 
 def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:
-    """Return the segments, checked, with lengths and beginnings as functions.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the segments, checked, with lengths and beginnings as functions."""
     pieces: list[Piece] = []
     for number, segment in enumerate(segments):
         what = f"segments: {number}: "

@@ -10,7 +10,7 @@ from typing import Any
 from contin import checks
 from contin.arrays import Array, Function
 from contin.boundary.canonical import Canonical, Variation, canonical
-from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, dependent_conditions, legendre, stability_of
+from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, stability_of
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
 from contin.core.trial import Event
@@ -167,7 +167,7 @@ class VariationalProblem(BoundaryValueProblem):
 
     def undetermined(self, system: Collocation, x: Array) -> str:
         """Return that conditions repeat or contradict each other at a solution x."""
-        return dependent_conditions(system, x)
+        return degeneracy(system, x, solved=True)
 
     @property
     def index(self) -> Event:

@@ -17,8 +17,10 @@ from contin.functions.batch import Batch
 WINDING = "winding_"
 #: A field is periodic in an angle up to this part of its size: ten times smaller, the round-off of sin(10 phi) would count.
 _EQUAL = 1e-9
-#: Places at which that is checked, from this seed, with states between -1 and 1 and parameters about their default values.
-_PLACES, _SEED = 5, 11
+#: Places at which that is checked, with states between -1 and 1 and parameters about their default values.
+_PLACES = 5
+#: Seed of these places.
+_SEED = 11
 
 #: Names of angles, which have the period 2 pi, or names with periods.
 Angles = Sequence[str] | Mapping[str, float]

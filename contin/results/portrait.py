@@ -18,8 +18,10 @@ from contin.results.axes import Axes, new_axes
 from contin.results.profile import Profile
 from contin.results.record import Record, over_t
 
-#: Places at which a solution is drawn, for each interval of its mesh, and at least.
-_PER_INTERVAL, _FEWEST = 8, 400
+#: Places at which a solution is drawn, for each interval of its mesh: a polynomial of degree 8 looks smooth.
+_PER_INTERVAL = 8
+#: Fewest places at which a solution is drawn: the width of a small picture in points.
+_FEWEST = 400
 #: Colours of states (Okabe-Ito: told apart by the colour-blind), in order; more states begin anew.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 #: States in a picture over time: more cannot be told apart.

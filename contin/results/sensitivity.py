@@ -47,12 +47,7 @@ def sensitivities(
 
 
 def _fixed(point: Record, held: str | Callable[[Trial], float] | None) -> str | Callable[[Trial], float]:
-    """Return the quantity that stays fixed: a column, or a function of a trial.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the quantity that stays fixed: a column, or a function of a trial."""
     if callable(held):
         return held
     system = system_of(point, "point")

@@ -32,8 +32,10 @@ from contin.results.point import Point
 
 Result = TypeVar("Result")
 
-#: First entry of every file, of today and of version 0.2.
-_FORMAT, _OF_VERSION_2 = "contin branch 3", "contin branch 1"
+#: First entry of every file.
+_FORMAT = "contin branch 3"
+#: First entry of files of version 0.2.
+_OF_VERSION_2 = "contin branch 1"
 #: Fields of a point that are stored as they are.
 _FIELDS = (
     "label", "name", "arclength", "iterations", "newton_error", "discretization_error", "errors", "functionals", "index",

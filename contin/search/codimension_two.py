@@ -35,9 +35,10 @@ from contin.search.takens import Takens
 
 #: Amplitudes of first cycles, relative to 1 + the largest state, in the order in which they are tried.
 _AMPLITUDES = (1e-2, 1e-3, 1e-1)
-#: Sizes of first homoclinic orbits as parts of `Takens.rate`, in the order in which they are tried, and the part of a size by
-#: which it is changed for the tangent.
-_SIZES, _CHANGE = (0.1, 0.2, 0.05, 0.4), 1e-3
+#: Sizes of first homoclinic orbits as parts of `Takens.rate`, in the order in which they are tried.
+_SIZES = (0.1, 0.2, 0.05, 0.4)
+#: Part of a size by which it is changed for the tangent: differences are right to its square.
+_CHANGE = 1e-3
 #: Part of the size of a first guess by which it may be corrected: what it leaves out is of second order.
 _OFF = 0.5
 

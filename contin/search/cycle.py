@@ -21,20 +21,25 @@ from contin.search.solving import solve
 #: A motion that is further off, relative to 1 + where it began, goes to infinity: towards a pole steps of the integrator shrink
 #: without end. Ten times larger, it takes a step or two more.
 _FAR = 1e12
-#: Tolerances of the integration while the motion settles, and of the round that is the guess. With 1e-9 for both it takes twice
-#: as long.
-_SETTLES, _ACCURATE = 1e-6, 1e-9
-#: The motion is at rest below this part of 1 + its size, and back within this part of its size.
-_RESTS, _BACK = 1e-6, 1e-2
+#: Tolerance of the integration while the motion settles, relative and absolute. With 1e-9 `cycle` takes twice as long.
+_SETTLES = 1e-6
+#: Tolerance of the integration of the round that is the guess, which Newton's method corrects.
+_ACCURATE = 1e-9
+#: A motion smaller than this part of 1 + its largest state is at rest: that is the tolerance with which it has settled.
+_RESTS = 1e-6
+#: Distance from its start, as a part of the size of the motion, within which it has come back: Newton's method finds the cycle.
+_BACK = 1e-2
 #: Parts of the time in which it settles, in which it must come back: the first ones are enough for most.
 _PARTS = (1 / 16, 1 / 4, 1)
 #: Looks at a motion in each round of an angle: at three or less, a whole round could look like none.
 _PER_ROUND = 8
 #: Places of the round that is the guess.
 _SAMPLES = 1000
-#: A forced motion closes after at most so many periods of the forcing, where it comes back within this part of its size: ten
-#: times larger, a doubled cycle close to its bifurcation would be taken for one period.
-_MOST_ROUNDS, _CLOSED = 16, 1e-3
+#: Largest number of periods of the forcing after which a motion is looked for to close: four period doublings.
+_MOST_ROUNDS = 16
+#: Distance from its start, as a part of its size, at which a forced motion closes: ten times larger, a doubled cycle close to
+#: its bifurcation would be taken for one period.
+_CLOSED = 1e-3
 
 
 @checks.arguments
@@ -151,10 +156,6 @@ def _forced_rounds(
     """Return times (K,), from 0, and states (K, n) of a forced motion that has settled, and after how many periods it closes.
 
     ``start`` holds the states and the time in which the motion settles, which is made a whole number of periods.
-
-    Raises
-    ------
-    ProblemError
     """
     period = problem.duration({**values, ROUNDS: 1.0})
     settled = _integrated(field, start[0], period * math.ceil(start[1] / period), _SETTLES).y[:, -1]
@@ -188,10 +189,6 @@ def _one_round(field: Field, start: Array, longest: float, periods: Array) -> tu
 
     A round ends where the motion comes back through the plane normal to it at its start, close to the start; angles come back
     up to whole rounds.
-
-    Raises
-    ------
-    ProblemError
     """
     across = np.asarray(field(0.0, start), dtype=float)
     for part in _PARTS:

@@ -26,8 +26,6 @@ _ASIDE = 0.1
 _STARTS = [(m, longest) for longest in (3.0, 1.0, 0.3) for m in (1.0, -1.0, 5.0, -5.0, 20.0, -20.0, 50.0, -50.0)]
 #: Iterations from one start: ten times those of an iteration that converges.
 _MOST_ITERATIONS = 100
-#: Smallest squared distance, in place of zero where it is divided by.
-_NO_DISTANCE = 1e-300
 
 
 def correct_away(system: Discretization, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
@@ -62,7 +60,7 @@ def _deflated(system: Discretization, x: Array, known: list[Array], longest: flo
         stretch = 0.0  # the derivative of log(prod (1 + 1 / |x - r|^2)) along the step
         for root in known:
             away = x - system.lifted(root, x)
-            distance = max(inner(system, away, away), _NO_DISTANCE)
+            distance = inner(system, away, away) or np.finfo(float).tiny  # at the known solution itself
             stretch -= 2 * inner(system, away, step) / (distance * (1 + distance))
         step = step / (1 - stretch)
         size = np.max(np.abs(step) / (1 + np.abs(x)))

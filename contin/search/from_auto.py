@@ -26,9 +26,11 @@ from contin.results.point import Point
 
 #: Labels of points that contin locates, too.
 _LOCATED = (Label.BRANCH_POINT, Label.FOLD, Label.HOPF, Label.PERIOD_DOUBLING, Label.TORUS)
-#: The run goes back from AUTO's solution, and then looks for the point at so many places, in steps that begin with this length.
-#: With steps ten times larger, more than one point of a kind can lie in the first one.
-_STEP, _LOOKS = 0.01, 20
+#: First step of the runs back from AUTO's solution and across it, in units of arclength. Ten times larger, more than one point
+#: of a kind can lie in it.
+_STEP = 0.01
+#: Most points of the run that looks for AUTO's point: steps grow from the first one, so that two or three lead there.
+_LOOKS = 20
 #: The point found is AUTO's if its parameter is as close as this: AUTO's tolerance of special points is 1e-4 by default. Ten
 #: times larger, the next point of the same kind could be taken.
 _CLOSE = 1e-2

@@ -35,11 +35,14 @@ _STEPS = 10_000
 _LONGEST = 500.0
 #: The orbit has turned back where it is closest for the first time, if it is closer than this part of its largest distance.
 _BACK = 0.95
-#: Values of the parameter on both sides that are looked at, closer to each other near that of the start, as the saddle may end
-#: there; halvings of the interval between two of them.
-_VALUES, _HALVINGS = 24, 60
-#: The interval is halved until the orbit comes back to this part of its largest distance; with the second it is no jump of m.
-_CLOSE, _JUMP = 1e-3, 0.05
+#: Values of the parameter on each side that are looked at, closer to each other near the start, as the saddle may end there.
+_VALUES = 24
+#: Halvings of the interval between two values, at most: the bits of a number.
+_HALVINGS = 60
+#: Distance at which an orbit has come back, as a part of its largest one: Newton's method then finds the homoclinic orbit.
+_CLOSE = 1e-3
+#: Where the interval cannot be halved any more, an orbit further off than this part of its largest distance shows a jump of m.
+_JUMP = 0.05
 #: An orbit that is this far away, relative to 1 + the states of the saddle, is on its way to infinity.
 _LOST = 1e6
 #: The orbit is cut off at the start where it is this close to the saddle, as a part of its largest distance.

@@ -128,12 +128,7 @@ def _from_saddle(
 
 
 def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, Newton]) -> Point:
-    """Return the homoclinic orbit near a cycle.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the homoclinic orbit near a cycle."""
     system: Any = cycle.system
     names = checks.names("free", free)
     if len(names) != 1 or names[0] not in system.problem.parameters or names[0] == PERIOD:

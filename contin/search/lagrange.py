@@ -11,9 +11,12 @@ from contin.boundary.system import Collocation
 from contin.errors import ProblemError
 from contin.problems.statement import multipliers_of
 
-#: Gauss-Newton steps, halvings of one, and the part of the residual that the last one gains: one step does where the energy is
-#: quadratic in the controls.
-_STEPS, _HALVINGS, _SETTLED = 30, 30, 1e-3
+#: Most Gauss-Newton steps: one does where the energy is quadratic in the controls.
+_STEPS = 30
+#: Most halvings of a step: a step of 1e-9 of itself gains nothing.
+_HALVINGS = 30
+#: The iteration ends with a step that gains less than this part of the residual: Newton's method goes on from there.
+_SETTLED = 1e-3
 #: Added to the normal equations, relative to their trace: multipliers that nothing determines stay small.
 _LITTLE = 1e-13
 #: The most intervals on which multipliers are looked for: the equations are solved densely. Newton's method does the rest.

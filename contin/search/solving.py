@@ -148,12 +148,7 @@ def _on_switches(system: System, done: Corrected, corrected: Callable[[System, A
 
 
 def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
-    """Return the solution near x with the value of a free parameter that x has.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """Return the solution near x with the value of a free parameter that x has."""
     row = np.zeros(system.size)
     row[system.parameter_index(name)] = 1.0
     return correct(system, x, row, row @ x, newton, sizes=system.magnitudes)
@@ -181,12 +176,7 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
 
 
 def _check_determined(system: System, x: Array) -> None:
-    """Check that a solution does not come with others around it, of which round-off chose one.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Check that a solution does not come with others around it, of which round-off chose one."""
     if reason := system.undetermined(x):
         raise ProblemError(reason)
 

@@ -25,8 +25,12 @@ from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.problems.own_names import TIME
 
-#: First mesh, and half of the time in units of 1 / e: cut off there, the orbit ends at a distance of 2e-5 of its size.
-_INTERVALS, _DEGREE, _HALF = 40, 4, 7.0
+#: Intervals of the first mesh; it is adapted in any case.
+_INTERVALS = 40
+#: Its degree: that of cycles.
+_DEGREE = 4
+#: Half of the time, in units of 1 / size: cut off there, the orbit ends at a distance of 2e-5 of its size from the saddle.
+_HALF = 7.0
 
 
 class Takens:
