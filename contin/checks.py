@@ -9,7 +9,7 @@ import os
 import sys
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -166,10 +166,12 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 
 def fields(record: Any) -> None:
-    """Require that the fields of a dataclass are what their annotations say."""
+    """Require that the fields of a dataclass that were given are what their annotations say."""
     hints, _ = _annotations(cast(Any, type(record)))
-    for name, kind in hints.items():
-        if said := _refusal(name, getattr(record, name), kind):
+    defaults = vars(type(record))
+    for name, value in vars(record).items():
+        given = name not in defaults or value is not defaults[name]
+        if given and (said := _refusal(name, value, hints.get(name, Any))):
             raise ProblemError(said)
 
 
@@ -193,30 +195,35 @@ _PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 
 
 def _refusal(what: str, value: Any, kind: Any) -> str:
-    """Return why a value may not stand where an annotation is, "" if it may; an array is a list."""
+    """Return why a value may not stand where an annotation is, "" if it may; an array is a list.
+
+    In lists and mappings the first entry that is wrong is named.
+    """
     outer, inner = typing.get_origin(kind), typing.get_args(kind)
-    wrong = f"{what}: {shown(value)} must be {_words(kind)}"
+    fits = True
+    inside: Iterator[str] = iter(())
     if kind in _PLAIN:
-        return "" if _PLAIN[kind][1](value) else wrong
-    if outer in (typing.Union, types.UnionType):
-        said = [_refusal(what, value, each) for each in inner if each is not type(None)]
-        fits = "" in said or (value is None and type(None) in inner)
-        return "" if fits else said[0] if len(said) == 1 else wrong
-    if outer is collections.abc.Callable:
-        return "" if callable(value) else wrong
-    if outer is collections.abc.Mapping:
-        if not isinstance(value, Mapping) or any(_refusal("", name, inner[0]) for name in value):
-            return wrong
-        return next(filter(None, (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items())), "")
-    if outer in (collections.abc.Sequence, tuple, np.ndarray):
-        array = isinstance(value, np.ndarray) and (value.ndim == 1 or outer is np.ndarray)
-        listed = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        fits = _PLAIN[kind][1](value)
+    elif outer in (typing.Union, types.UnionType):
+        others = [each for each in inner if each is not types.NoneType]
+        if value is not None and len(others) == 1:
+            return _refusal(what, value, others[0])
+        fits = any(value is None if each is types.NoneType else not _refusal(what, value, each) for each in inner)
+    elif outer is collections.abc.Callable:
+        fits = callable(value)
+    elif outer is collections.abc.Mapping:
+        fits = isinstance(value, Mapping) and not any(_refusal(what, name, inner[0]) for name in value)
+        inside = (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items()) if fits else inside
+    elif outer is np.ndarray:
+        fits = isinstance(value, (np.ndarray, list, tuple))
+    elif outer in (collections.abc.Sequence, tuple):
         fixed = outer is tuple and inner[-1] is not ...
-        if not (array or listed) or (fixed and len(value) != len(inner)):
-            return wrong
-        kinds = () if outer is np.ndarray else inner if fixed else [inner[0]] * len(value)
-        return next(filter(None, (_refusal(what, each, of) for each, of in zip(value, kinds))), "")
-    return "" if isinstance(value, outer or kind) else wrong
+        fits = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        fits = (fits or (isinstance(value, np.ndarray) and value.ndim == 1)) and (not fixed or len(value) == len(inner))
+        inside = (_refusal(what, *pair) for pair in zip(value, inner if fixed else [inner[0]] * len(value))) if fits else inside
+    else:
+        fits = isinstance(value, outer or kind)
+    return next(filter(None, inside), "") if fits else f"{what}: {shown(value)} must be {_words(kind)}"
 
 
 def _words(kind: Any) -> str:
