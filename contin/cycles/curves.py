@@ -161,7 +161,7 @@ def _resonance(label: str, kappa: float) -> Event:
 
     A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi and go back: `_touched`.
     """
-    sign, name = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}"
+    sign, name, at_end = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}", abs(kappa) == 1
 
     def distance(trial: Trial) -> float:
         return sign * (cast(TorusCurve, trial.system).kappa(trial.x) - kappa)
@@ -169,9 +169,16 @@ def _resonance(label: str, kappa: float) -> Event:
     def search(arc: Arc, _: object) -> list[SpecialPoint] | None:
         return _touched(arc, test, distance)
 
-    at_end = abs(kappa) == 1
-    test = Event(label, name, distance, terminal=at_end, search=search if at_end else None)
+    def asks(arc: Arc) -> bool:
+        return arc.passes(test) or _change(arc.before) * _change(arc.trial) < 0
+
+    test = Event(label, name, distance, terminal=at_end, search=search if at_end else None, asks=asks if at_end else None)
     return test
+
+
+def _change(trial: Trial) -> float:
+    """Return how fast kappa changes along the curve."""
+    return float(trial.tangent[-1])
 
 
 def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
@@ -181,10 +188,5 @@ def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[
     goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where cycles that have an
     image become their own image: there the pair comes to 1, and the curve goes back on itself.
     """
-
-    def change(trial: Trial) -> float:
-        """Return how fast kappa changes along the curve."""
-        return float(trial.tangent[-1])
-
     stops = f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image"
-    return meeting(arc, test, (change, distance), _NEAR, stops)
+    return meeting(arc, test, (_change, distance), _NEAR, stops)

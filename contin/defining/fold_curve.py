@@ -77,8 +77,7 @@ class FoldCurve(Defining):
 
     def events(self) -> list[Event]:
         """Return those of cusps (w.F_zz v v = 0), of folds that meet a branch point (w.F_lambda = 0), and of the kind."""
-        cusp = Event("CP", "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [])
-        return [cusp, _MEETS, *super().events(), *self.base.events_on_folds()]
+        return [_CUSP, _MEETS, *super().events(), *self.base.events_on_folds()]
 
 
 def _bend(trial: Trial) -> float:
@@ -127,5 +126,12 @@ def _singular_point(arc: Arc) -> list[SpecialPoint] | None:
     return meeting(arc, _MEETS, (_by_first, _by_last), _SMALL * largest, stop)
 
 
+#: w.F_zz v v = 0.
+_CUSP: Event = Event(
+    "CP", "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [], asks=lambda arc: arc.passes(_CUSP)
+)
 #: Where the fold meets a branch point: w.F_lambda = 0.
-_MEETS = Event("BP", "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc))
+_MEETS: Event = Event(
+    "BP", "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc),
+    asks=lambda arc: arc.passes(_MEETS),
+)  # fmt: skip

@@ -131,6 +131,10 @@ class Arc:
         """The end is another point on a mesh with points where conditions switch."""
         return self.trial.settled is not self.trial
 
+    def passes(self, test: Event) -> bool:
+        """Return whether there is a zero of a test function by its values at both ends."""
+        return test.passed(self.before.value(test), self.trial.value(test))
+
     def at(self, distance: float) -> Trial:
         """Return the point of the curve at a distance along the state's tangent.
 

@@ -88,7 +88,7 @@ def _sign(test: Event) -> Entry:
             return test.asks(arc)
         if test.search is not None or test.looks:
             return True
-        return test.passed(arc.before.value(test), arc.trial.value(test))
+        return arc.passes(test)
 
     return asks
 
