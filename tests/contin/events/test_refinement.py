@@ -55,7 +55,7 @@ def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
     def elsewhere(system, x, tangent, test, newton):
         return Trial(system, x + 0.5, Linearization(tangent, 1.0)), 0.0
 
-    monkeypatch.setattr(refinement, "_zero_again", elsewhere)
+    monkeypatch.setattr(refinement, "zero_again", elsewhere)
     branch = trace(start, settings, free=["lam"])
     assert not branch.labelled("LP")
     (note,) = branch.notes
@@ -77,7 +77,7 @@ def test_a_point_for_which_newton_fails_on_finer_meshes_keeps_its_label(monkeypa
     def fails(system, x, tangent, test, newton):
         raise ConvergenceError("Newton did not converge")
 
-    monkeypatch.setattr(refinement, "_zero_again", fails)
+    monkeypatch.setattr(refinement, "zero_again", fails)
     branch = trace(start, free=["lam"], limits={"lam": (0, 4), "mean": (-1, 1)})
     (fold,), (note,) = branch.labelled("LP"), branch.notes
     assert fold["lam"] == pytest.approx(3.513830719125161, abs=1e-8) and fold.errors["lam"] != fold.errors["lam"]
