@@ -5,27 +5,30 @@ Only the imports that start a command are here, so that ``ribbon --help`` answer
 
 from __future__ import annotations
 
+import importlib
 import sys
 
-#: Commands with a description. Each is the module of this package with its name.
+#: Commands: the module, and a description. The module has ``parser()``, which returns its command line.
 COMMANDS = {
-    "run": "follow a branch, or all branches of a diagram, to result files",
-    "secondary": "follow the branches that leave at secondary bifurcations",
-    "graph": "list branches, states and folds of a bifurcation diagram",
-    "explore": "write results as one page for a browser",
-    "export": "write a strip for 3D printing, Blender, ParaView or a table; a branch as a film",
-    "strip": "compute the states of a strip of given dimensions, in SI units",
-    "paper": "compute the tables and figures of Audoly & Seffen (2015)",
-    "shell": "compute the unfolding strip as a solid by finite elements (CalculiX)",
+    "run": ("branches.run.__main__", "follow a branch, or all branches of a diagram, to result files"),
+    "secondary": ("branches.secondary", "follow the branches that leave at secondary bifurcations"),
+    "plot": ("branches.plot", "draw a result: a branch with its strips, a diagram, any column against any other"),
+    "graph": ("branches.graph.__main__", "list branches, states and folds of a bifurcation diagram"),
+    "explore": ("branches.explore.__main__", "write results as one page for a browser"),
+    "export": ("branches.export.__main__", "write a strip for 3D printing, Blender, ParaView or a table; a branch as a film"),
+    "strip": ("branches.strip.__main__", "compute the states of a strip of given dimensions, in SI units"),
+    "paper": ("branches.paper.__main__", "compute the tables and figures of Audoly & Seffen (2015)"),
+    "shell": ("branches.shell", "compute the unfolding strip as a solid by finite elements (CalculiX)"),
 }
 EXIT_BAD_INPUT = 2
-_COMPLETION = 'The tab key completes after: eval "$(ribbon completion bash)" (or zsh; fish: ... | source).\n'
+_COMPLETION = 'The tab key completes after: eval "$(ribbon completion bash)" (or zsh, fish, ...).\n'
 
 
 def help_text() -> str:
     """Return the list of all commands."""
-    lines = [f"  {name:<10} {what}" for name, what in COMMANDS.items()]
-    head = "usage: ribbon COMMAND ...\n\nBuckled equilibria of closed elastic strips.\n\n"
+    lines = [f"  {name:<10} {what}" for name, (_, what) in COMMANDS.items()]
+    lines.append(f"  {'scenes':<10} list the scenes of the package, which 'ribbon run NAME' runs")
+    head = "usage: ribbon COMMAND ...\n\nBuckled equilibria of closed and open elastic strips.\n\n"
     return head + "\n".join(lines) + "\n\n'ribbon COMMAND --help' lists the options of a command.\n" + _COMPLETION
 
 
@@ -40,26 +43,55 @@ def main(argv=None) -> int:
 
         sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')}\n")
         return 0
+    if words == ["scenes"]:
+        return _scenes()
     if words[:1] == ["completion"]:
         return _complete(words[1:])
     if not words or words[0] not in COMMANDS:
         problem = f"there is no command {words[0]!r}" if words else "a command is needed"
-        sys.stderr.write(f"error: {problem}; the commands are {', '.join(COMMANDS)} (--help describes them)\n")
+        known = ", ".join((*COMMANDS, "scenes"))
+        sys.stderr.write(f"error: {problem}; the commands are {known} (--help describes them)\n")
         return EXIT_BAD_INPUT
     import runpy
 
+    from branches.store import command
+
+    command.prefix = "ribbon "
     sys.argv = [f"ribbon {words[0]}", *words[1:]]
-    runpy.run_module(f"branches.{words[0]}", run_name="__main__", alter_sys=True)  # as python -m does: ends by SystemExit
+    runpy.run_module(COMMANDS[words[0]][0], run_name="__main__", alter_sys=True)  # as python -m does: ends by SystemExit
+    return 0
+
+
+def _scenes() -> int:
+    """List the scenes of the package with their titles."""
+    from branches.scene.packaged import scenes
+    from branches.scene.text import read
+    from branches.store.command import write_output
+
+    titles = {file.stem: read(file.read_text(encoding="utf-8"), file.name).get("title", "") for file in scenes()}
+    write_output("".join(f"{name:<18} {title}\n" for name, title in titles.items()))
     return 0
 
 
 def _complete(words: list[str]) -> int:
-    from branches.completion import SHELLS, script
+    """Write what a shell evaluates to complete commands, their options and names of files."""
+    import argparse
 
-    if len(words) != 1 or words[0] not in SHELLS:
-        sys.stderr.write(f"error: completion: must be followed by one of {', '.join(SHELLS)}\n")
+    import shtab
+
+    if len(words) != 1 or words[0] not in shtab.SUPPORTED_SHELLS:
+        sys.stderr.write(f"error: completion: must be followed by one of {', '.join(shtab.SUPPORTED_SHELLS)}\n")
         return EXIT_BAD_INPUT
-    sys.stdout.write(script(words[0], COMMANDS))
+    parser = argparse.ArgumentParser("ribbon", description="Buckled equilibria of elastic strips.")
+    commands = parser.add_subparsers()
+    for name, (module, what) in COMMANDS.items():
+        own = importlib.import_module(module).parser()
+        for action in own._actions:
+            if action.nargs != 0 and not action.choices:
+                action.complete = shtab.FILE
+        commands.add_parser(name, help=what, parents=[own], add_help=False, conflict_handler="resolve")
+    commands.add_parser("scenes", help="list the scenes of the package")
+    sys.stdout.write(shtab.complete(parser, words[0]))
     return 0
 
 

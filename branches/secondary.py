@@ -6,12 +6,11 @@ these scenes from the labelled points SB of a result, runs them, and adds the br
 
 from __future__ import annotations
 
-from branches import interrupt
+from branches.store import interrupt
 
 if __name__ == "__main__":  # before the imports below, which take a second
     interrupt.begin(interrupt.BRANCHES_KEPT)
 
-import argparse
 import json
 import sys
 from dataclasses import dataclass
@@ -19,14 +18,17 @@ from pathlib import Path
 
 import numpy as np
 
-from branches import diagram_graph as diagram
-from branches.config import Config, ConfigError, dump, parse
-from branches.display import complain, write_output
-from branches.files import StoreError, prepare, write_bytes
-from branches.job import compute_branch
-from branches.names import DIAGRAM, secondary_file
-from branches.progress import Progress
-from branches.read import StoredBranch, complete_run, read_branch
+from branches.graph import closed as diagram
+from branches.graph.stored import DIAGRAM, new_graph, read, save
+from branches.run.progress import Progress
+from branches.run.runner import compute_scene
+from branches.scene.closed import ClosedScene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, parse
+from branches.store.branch import StoredBranch
+from branches.store.command import Parser, complain, write_output
+from branches.store.files import StoreError, prepare, write_bytes
+from branches.store.read import complete_run, read_branch
 from contin import ContinError
 from ribbon_model.domains import CELL, HALF_LOOPS
 from ribbon_model.modes import Mode
@@ -75,7 +77,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
             progress.tell(_line(switch) + "\n")
         progress.part_done()
     graph.graph["switches"] = json.dumps(old + switches)
-    diagram.save(graph, folder)
+    save(graph, folder)
     return switches
 
 
@@ -88,7 +90,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
         There is none.
     """
     if result.is_dir():
-        edges = diagram.read(result).edges(data=True)
+        edges = read(result).edges(data=True)
         names = sorted({data["file"] for _, _, data in edges if "origin" not in data})
         found = {name: read_branch(result / name) for name in names}
     else:
@@ -101,7 +103,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
 
 def _diagram_in(folder: Path):
     """Return the diagram of a folder, or a new one."""
-    return diagram.read(folder) if (folder / DIAGRAM).exists() else diagram.new_graph()
+    return read(folder) if (folder / DIAGRAM).exists() else new_graph()
 
 
 def _remove_secondaries(graph, primaries) -> list[dict]:
@@ -146,7 +148,7 @@ def _attempts(graph, branch: StoredBranch, name: str, event, place: _Place):
 def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -> dict:
     """Follow one branch and add it to the diagram; return the outcome."""
     config = _scene(branch.config, event, reversal, place.settings)
-    file = secondary_file(config, {data["file"] for _, _, data in graph.edges(data=True)})
+    file = config.secondary_file({data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
@@ -164,17 +166,17 @@ def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -
     return found | {"outcome": "failed" if stored.status == "lost" else "followed", "reason": stored.stop}
 
 
-def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
+def _scene(primary: dict, event, reversal: str, settings: list[str]) -> ClosedScene:
     """Return the scene of a secondary branch: the fields of the primary one that are valid on another domain."""
     kept = {name: primary[name] for name in ("law", "nu", "Gamma", "m", "n", "steps", "stability", "stride")}
     kept["mesh"] = primary["mesh"]
     kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
     origin = {name: float(event[name]) for name in ("kappa_n", "kappa_star")} | {"mode": event["name"].decode()}
-    text = dump(Config.model_validate(kept | {"domain": HALF_LOOPS[reversal].name, "origin": origin}))
+    text = dump(ClosedScene.model_validate(kept | {"domain": HALF_LOOPS[reversal].name, "origin": origin}))
     return parse(text, "scene", settings)
 
 
-def _arrived_before(graph, config: Config) -> str:
+def _arrived_before(graph, config: ClosedScene) -> str:
     """Return the file of a branch on this domain that begins or ends at the origin, if the diagram has one."""
     origin = config.origin.model_dump(exclude={"mode"})
     for branch in diagram.secondaries(graph, config.material, config.nu):
@@ -184,11 +186,11 @@ def _arrived_before(graph, config: Config) -> str:
     return ""
 
 
-def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
+def _computed(path: Path, config: ClosedScene, progress: Progress) -> StoredBranch:
     """Return the branch of a scene: from the file if it is complete, otherwise computed."""
     stored = complete_run(path, config)
     if stored is None:
-        write_bytes(path, compute_branch(config, progress).image)
+        write_bytes(path, compute_scene(config, progress).image)
         stored = read_branch(path)
     return stored
 
@@ -222,14 +224,14 @@ def _line(switch: dict) -> str:
     return f"{start}: goes to {switch['goes']}, |R| up to {switch['force'][1]:.4f}{index}{lost}"
 
 
-def main(argv=None) -> int:
-    """Run the command; return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m branches.secondary", allow_abbrev=False,
-        description="Follow the branches that leave a primary branch at its secondary bifurcations, and add them to a diagram.",
-        epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input, "
+def parser() -> Parser:
+    """Return the command line."""
+    parser = Parser(
+        "secondary",
+        "Follow the branches that leave a primary branch at its secondary bifurcations, and add them to a diagram.",
+        "Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input, "
         "130 interrupted.",
-    )  # fmt: skip
+    )
     parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
     parser.add_argument(
         "--out", metavar="DIR", help="folder for the results (default: the folder of the diagram; for a file NAME_secondary)"
@@ -238,7 +240,12 @@ def main(argv=None) -> int:
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field of the scenes of secondary branches"
     )
     parser.add_argument("--quiet", action="store_true", help="print only the last line")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def main(argv=None) -> int:
+    """Run the command; return the exit code."""
+    options = parser().parse_args(argv)
     result = Path(options.result)
     folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")
     try:

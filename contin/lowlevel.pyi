@@ -7,6 +7,7 @@ from .core.state import State, Stop
 from .core.trial import Trial
 from .equilibria.system import Algebraic
 from .events.branch_point import BranchPoint, locate_branch_point
+from .events.error import error
 from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
@@ -21,6 +22,7 @@ from .search.trace import follow
 
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Continuation", "MultiplePoint", "State", "Stop", "StoredColumns",
-    "Trial", "basis", "cache_directory", "correct", "eigenbasis", "exact_text", "follow", "gradient", "interpolation", "least",
-    "locate_branch_point", "minimum", "point_of", "read_columns", "root", "temporary_name", "write_whole",
+    "Trial", "basis", "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "gradient",
+    "interpolation", "least", "locate_branch_point", "minimum", "point_of", "read_columns", "root", "temporary_name",
+    "write_whole",
 ]  # fmt: skip

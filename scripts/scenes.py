@@ -33,9 +33,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from pydantic import ValidationError  # noqa: E402
 
-from branches.config import Config, ConfigError  # noqa: E402
-from branches.ends import checked, is_threshold  # noqa: E402
-from branches.job import begun  # noqa: E402
+from branches.scene.closed import ClosedScene  # noqa: E402
+from branches.scene.closed_stage import is_threshold  # noqa: E402
+from branches.scene.fields import ConfigError
+from branches.scene.stages import stages_of
 from contin import ConvergenceError, Point  # noqa: E402
 from contin.lowlevel import Stop  # noqa: E402
 from ribbon_model import exact  # noqa: E402
@@ -79,14 +80,14 @@ class Result:
 # --- drawing --------------------------------------------------------------------------------------------------------
 
 
-def draw(seed: int, number: int, largest: int, laws=NAMES, interval=(-0.99, 0.5)) -> Config:
+def draw(seed: int, number: int, largest: int, laws=NAMES, interval=(-0.99, 0.5)) -> ClosedScene:
     """Return the valid scene of this number, m and n up to ``largest``."""
     random = np.random.default_rng([seed, number])
     while True:
         law, nu = laws[random.integers(len(laws))], float(random.uniform(*interval))
         m, n = (int(value) for value in random.integers(1, largest + 1, 2))
         try:
-            return Config(law=law, nu=nu, m=m, n=n)
+            return ClosedScene(law=law, nu=nu, m=m, n=n)
         except ValidationError:
             continue
 
@@ -101,14 +102,15 @@ def is_wide(number: int, count: int, wide: int) -> bool:
 # --- comparing ------------------------------------------------------------------------------------------------------
 
 
-def compare(config: Config) -> Result:
+def compare(config: ClosedScene) -> Result:
     """Compute a scene and compare it with the exact solution."""
     began = time.perf_counter()
     name = f"{config.law} ({config.m}, {config.n}), nu = {config.nu!r}"
     limits = config.limits["kappa_n"]
     try:
-        run = begun(config)[0]
-        points = [checked(point, run, config) for point in run if point.label]
+        (stage,) = stages_of(config)
+        run = stage.start()
+        points = [stage.judge(point, run) for point in run if point.label]
     except (ConfigError, ConvergenceError) as error:
         return Result(name, "", str(error), 0.0, 0.0, time.perf_counter() - began)
     assert run.stop is not None
@@ -128,7 +130,7 @@ def compare(config: Config) -> Result:
     return Result(name, fault, unfinished, error, estimate, time.perf_counter() - began)
 
 
-def differences(points: list[Point], stop: Stop, expected: list, config: Config) -> tuple[str, str, list]:
+def differences(points: list[Point], stop: Stop, expected: list, config: ClosedScene) -> tuple[str, str, list]:
     """Return the first difference, why the run is unfinished, and (error, estimate) of all values compared."""
     unfinished = "" if stop.reason in ("trivial branch", "limit") else str(stop)
     if unfinished and expected[-1].label == "MX":  # a homoclinic orbit, where no method can follow the branch
@@ -165,7 +167,7 @@ def _kappas(points: list[Point]) -> list[float]:
     return [point["kappa_n"] for point in points]
 
 
-def _wrong_end(last: Point, stop: Stop, expected, config: Config) -> str:
+def _wrong_end(last: Point, stop: Stop, expected, config: ClosedScene) -> str:
     """Return how the end differs in kind from the exact one; empty if it does not."""
     if expected.label == "MX":
         return f"{stop}; exact: towards a homoclinic orbit at {expected.kappa_n:.9g}" if stop.reason == "trivial branch" else ""
@@ -184,7 +186,7 @@ def _wrong_end(last: Point, stop: Stop, expected, config: Config) -> str:
 # --- all of them ----------------------------------------------------------------------------------------------------
 
 
-def results(configs: Iterator[Config], workers: int) -> Iterator[Result]:
+def results(configs: Iterator[ClosedScene], workers: int) -> Iterator[Result]:
     """Yield the result of every scene, in order."""
     if workers == 1:
         yield from map(compare, configs)

@@ -70,14 +70,16 @@ def undisturbed(name: str, folder: Path) -> Scene:
 
 def load_kernels(names: list[str]) -> None:
     """Compile or load the functions of the scenes, once before processes are forked."""
-    from branches.config import DiagramConfig, parse
-    from branches.job import compute_branch
-    from branches.progress import StartingDisplay  # runs without rights cannot load modules that are not there when they fork
+    from branches.run.progress import (
+        StartingDisplay,  # runs without rights cannot load modules that are not there when they fork
+    )
+    from branches.run.runner import compute_scene
+    from branches.scene.parse import parse
 
     for name in names:
         config = parse(SCENES[name], name)
-        one = config.branches[0] if isinstance(config, DiagramConfig) else config
-        compute_branch(one, StartingDisplay(quiet=True))
+        one = next(iter(config.scenes.values()))
+        compute_scene(one, StartingDisplay(quiet=True))
 
 
 def torture(names: list[str], count: int, seed: int, folder: Path, tell: Callable[[str], None] = print) -> list[str]:

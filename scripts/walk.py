@@ -23,7 +23,7 @@ PACKAGES = ("contin", "ribbon_model", "branches")
 
 def calls(scene: Path, folder: Path) -> Counter[CodeType]:
     """Return how often each function of the project was called in a run of a scene."""
-    from branches.run import main
+    from branches.run.__main__ import main
 
     found: Counter[CodeType] = Counter()
     rooms = tuple(f"{ROOT / package}/" for package in PACKAGES)

@@ -81,7 +81,7 @@ def test_both_list_all_folders_of_code():
         p.parent.relative_to(ROOT) for name in ("contin", "ribbon_model", "branches") for p in (ROOT / name).rglob("*.py")
     }
     found = {".".join(folder.parts) for folder in folders}
-    assert found == set(BOTH["tool"]["setuptools"]["packages"])
+    assert found | {"branches.configs"} == set(BOTH["tool"]["setuptools"]["packages"])  # the scenes, a folder without code
     assert {name for name in found if name.startswith("contin")} == set(ALONE["tool"]["setuptools"]["packages"])
 
 

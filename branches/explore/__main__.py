@@ -5,19 +5,17 @@ from __future__ import annotations
 import shlex
 import sys
 
-from branches import interrupt
+from branches.store import interrupt
 
 EXIT_BAD_INPUT = 2
 
 
-def arguments(argv=None):
-    """The command line, parsed."""
-    import argparse
+def parser():
+    """Return the command line."""
+    from branches.store.command import Parser
 
-    parser = argparse.ArgumentParser(
-        prog="python -m branches.explore",
-        allow_abbrev=False,
-        description="Write one self-contained HTML page that shows results: the diagram, and the state at every point.",
+    parser = Parser(
+        "explore", "Write one self-contained HTML page that shows results: the diagram, and the state at every point."
     )
     parser.add_argument(
         "results", metavar="RESULT", nargs="+",
@@ -25,18 +23,18 @@ def arguments(argv=None):
     )  # fmt: skip
     parser.add_argument("--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
     parser.add_argument("--quiet", action="store_true", help="show no line of progress")
-    return parser.parse_args(argv)
+    return parser
 
 
 def main(argv=None) -> int:
     """Run the command; the exit code."""
-    from branches.display import complain, survive_any_encoding, write_output
+    from branches.store.command import complain, survive_any_encoding, typed, write_output
 
     survive_any_encoding()
-    options = arguments(argv)
+    options = parser().parse_args(argv)
     from branches.explore.gather import gather, left_out
     from branches.explore.page import MissingLibraryError, assemble
-    from branches.files import StoreError, write_bytes
+    from branches.store.files import StoreError, write_bytes
     from contin import ContinError
 
     try:
@@ -53,7 +51,7 @@ def main(argv=None) -> int:
     if missing := left_out(data):
         write_output(
             f"left out to keep the page small: the shapes of {len(missing)} branches, which the page names; a page of fewer "
-            f"results has them, as in: python -m branches.explore {shlex.quote(missing[0]['path'])}\n"
+            f"results has them, as in: {typed('explore')} {shlex.quote(missing[0]['path'])}\n"
         )
     return 0
 
@@ -68,7 +66,7 @@ def _page_path(out: str):
     """
     from pathlib import Path
 
-    from branches.files import StoreError, prepare
+    from branches.store.files import StoreError, prepare
 
     path = Path(out)
     if path.suffix.lower() not in (".html", ".htm"):

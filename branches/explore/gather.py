@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from branches import diagram_graph as diagram
-from branches.executor import executor, run_jobs
 from branches.explore import open_strips, profiles, strips
-from branches.files import StoreError
-from branches.names import DIAGRAM
-from branches.progress import Progress
-from branches.read import read_branch
+from branches.graph.stored import DIAGRAM, read_any
+from branches.run.executor import executor, run_jobs
+from branches.run.progress import Progress
+from branches.store.command import typed
+from branches.store.files import StoreError
+from branches.store.layout import OPEN
+from branches.store.read import read_branch
 
 #: Ending of the files that `contin.save` writes.
 STORED = ".npz"
@@ -62,7 +63,7 @@ def left_out(data: dict) -> list[dict]:
 
 def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -> dict:
     """Return the data of a page of strips; ``files`` maps each file to its name as given."""
-    if "stages" in read_branch(next(iter(files))).config:
+    if read_branch(next(iter(files))).scene.KIND == OPEN:
         return open_strips.gathered(list(files), next(filter(None, titles), ""))
     branches = _read(list(files), progress)
     title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
@@ -71,7 +72,7 @@ def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -
         families.setdefault(branch["family"], []).append(branch | {"path": str(path)})
     _leave_out(families)
     return {
-        "title": title, "kind": "strips", "axes": strips.AXES, "shown": ["kappa_n", "kappa_star"],
+        "title": title, "kind": "strips", "axes": branches[0]["axes"], "shown": ["kappa_n", "kappa_star"],
         "families": [strips.family_of(families[material]) for material in sorted(families)],
     }  # fmt: skip
 
@@ -112,12 +113,12 @@ def _leave_out(families: dict[tuple, list[dict]]) -> None:
 def _files_of(path: Path) -> tuple[list[Path], str]:
     """The branch files that a result stands for, and its title."""
     if path.suffix in (".yaml", ".yml"):
-        raise StoreError(f"{str(path)!r} is a scene, not a result; compute it first: python -m branches.run {path}")
+        raise StoreError(f"{str(path)!r} is a scene, not a result; compute it first: {typed('run')} {path}")
     if not path.is_dir():
         return [path], ""
     if not (path / DIAGRAM).exists() and (found := sorted(path.glob(f"*{STORED}"))):
         return found, ""
-    graph = diagram.read_any(path)
+    graph = read_any(path)
     names = dict.fromkeys(data["file"] for _, _, data in graph.edges(data=True))
     if not names:
         raise StoreError(f"the diagram in {str(path)!r} holds no branch")

@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.draw_open import WORDS
 from branches.explore.packing import column, compressed
 from branches.explore.profiles import KINDS
-from branches.files import StoreError
-from branches.open_branch import OpenBranch
-from branches.read import read_branch
+from branches.store.branch import StoredBranch
+from branches.store.files import StoreError
+from branches.store.layout import OPEN
+from branches.store.read import read_kind
 
 #: Nodes of a shape. Twice as many make pages twice as large; a quarter of them shows corners where a strip bends most.
 _NODES = 97
-#: Columns that no map needs.
-_LEFT_OUT = ("point", "label", "stage", "iterations", "newton_error", "discretization_error", "intervals", "kernel")
 
 
 def gathered(files: list[Path], title: str) -> dict:
@@ -25,16 +23,13 @@ def gathered(files: list[Path], title: str) -> dict:
     Raises
     ------
     StoreError
-        A point whose shape is not kept, or a file of a closed strip.
+        A point whose shape is not kept, or a file of another kind.
     """
-    branches = [(path, read_branch(path)) for path in files]
+    branches = [(path, read_kind(path, OPEN)) for path in files]
     first = branches[0][1]
-    for path, branch in branches:
-        if not isinstance(branch, OpenBranch):
-            raise StoreError(f"{str(path)!r} is of a closed strip, {str(files[0])!r} is not; a page shows one kind of result")
     parameter = first.followed(int(first.points["stage"][-1]))
     common = set.intersection(*(set(branch.points.dtype.names) for _, branch in branches))
-    columns = [name for name in first.points.dtype.names if name in common and name not in (*_LEFT_OUT, "arclength", "index")]
+    columns = [name for name in first.columns.shown() if name in common]
     varying = [name for name in columns if any(np.ptp(branch.points[name]) > 0 for _, branch in branches)]
     if parameter not in varying:
         raise StoreError(f"the results have no column in common that is followed; that of the first one is {parameter!r}")
@@ -44,16 +39,12 @@ def gathered(files: list[Path], title: str) -> dict:
     family = {"name": "stages", "parameter": parameter, "branches": stages, "circles": []}
     return {
         "title": title or first.config["title"] or first.scene.name, "kind": "open",
-        "axes": [(name, _words(name), name) for name in varying],
+        "axes": [(name, f"{words} ({name})", name) for name, words, _ in first.columns.axes(varying)],
         "shown": [parameter, first.conjugate(parameter)], "families": [family],
     }  # fmt: skip
 
 
-def _words(name: str) -> str:
-    return f"{WORDS[name]} ({name})" if name in WORDS else name
-
-
-def _stage(path: Path, branch: OpenBranch, number: int, columns: list[str]) -> dict:
+def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) -> dict:
     rows = np.flatnonzero(branch.points["stage"] == number)
     values = np.array([_states(branch, int(row)) for row in rows])
     labels = [branch.points["label"][row].decode() for row in rows]
@@ -73,7 +64,7 @@ def _stage(path: Path, branch: OpenBranch, number: int, columns: list[str]) -> d
     }  # fmt: skip
 
 
-def _states(branch: OpenBranch, row: int) -> np.ndarray:
+def _states(branch: StoredBranch, row: int) -> np.ndarray:
     """Return quaternion, eta and centreline (_NODES, 8) at equidistant places; the length is 2 pi, as that of closed strips."""
     t, states = branch.states_at(row)
     shape = branch.shape(row)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.explore.packing import column, compressed
-from branches.files import StoreError
+from branches.store.files import StoreError
 from contin.lowlevel import StoredColumns, read_columns
 
 #: The column of the size of the states, their root mean square over the nodes.

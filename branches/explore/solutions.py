@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from branches.files import StoreError
-from branches.read import StoredBranch
+from branches.store.branch import StoredBranch
+from branches.store.files import StoreError
 from contin import ConvergenceError, Newton
 from contin.lowlevel import Collocation, correct
 from ribbon_model.solution import Solution

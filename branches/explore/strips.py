@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from branches.config import Config, dump
 from branches.explore.packing import column, compressed
 from branches.explore.solutions import solutions
-from branches.files import StoreError
-from branches.labels import ON_PAGE, kind_of
-from branches.read import StoredBranch, read_branch
+from branches.scene.labels import ON_PAGE, kind_of
+from branches.store.branch import StoredBranch
+from branches.store.files import StoreError
+from branches.store.layout import CLOSED
+from branches.store.read import read_kind
 from contin.lowlevel import exact_text
 from ribbon_model.domains import DOMAINS
 from ribbon_model.laws import LAWS, from_label, label
@@ -27,14 +28,7 @@ from ribbon_model.solution import Solution
 
 #: What is kept of a shape at each node, in this order.
 CHANNELS = ("q0", "q1", "q2", "q3", "eta", "x1", "x2", "x3")
-#: Columns that the map can draw: name, title, and a short name, in HTML. The page makes the last one, energy + kappa_n^2 / 2.
-AXES = (
-    ("kappa_n", "natural curvature κ<sub>n</sub>L/2π", "κ<sub>n</sub> L/2π"),
-    ("kappa_star", "conjugate curvature κ*", "κ*"),
-    ("energy", "energy, in units 2πB/L", "energy"),
-    ("elastic", "elastic energy (energy + κ<sub>n</sub>²/2), in units 2πB/L", "elastic energy"),
-)
-#: Those of them in files, and the columns of a circle.
+#: Columns of a circle, which the linear theory gives; the page makes the elastic energy, energy + kappa_n^2 / 2.
 _MAP = ("kappa_n", "kappa_star", "energy")
 CIRCLE_COLUMNS = (*_MAP, "index")
 #: The index where a whole band of wavenumbers is unstable, which no number counts; and where it is not known.
@@ -52,10 +46,10 @@ def branch_of(path: Path) -> dict:
     Raises
     ------
     StoreError
-        The file cannot be read, it holds fewer than two points, or its columns are not those of a closed strip.
+        The file cannot be read, or it holds fewer than two points.
     """
     with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-        return _branch(path, read_branch(path))
+        return _branch(path, read_kind(path, CLOSED))
 
 
 @functools.cache
@@ -65,8 +59,6 @@ def _blas() -> ThreadpoolController:
 
 def _branch(path: Path, branch: StoredBranch) -> dict:
     config, points = branch.config, branch.points
-    if "stages" in config:
-        raise StoreError(f"{str(path)!r} is of an open strip, others are not; a page shows one kind of result")
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
     if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
@@ -74,9 +66,10 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
     marks = [_mark(event, branch.reason, config) for event in branch.events]
     about = {
-        "family": _family(config), "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
+        "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(config),
+        "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
         "title": config["title"], "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"),
-        "domain": config["domain"], "stop": branch.stop, "file": path.name, "config": dump(Config.model_validate(config)),
+        "domain": config["domain"], "stop": branch.stop, "file": path.name, "config": branch.scene_text(),
         "marks": marks, "labels": {int(event["point"]): event["label"].decode() for event in branch.events},
         "columns": {name: column(points[name]) for name in names}, "shapes": compressed(shapes(branch)),
     }  # fmt: skip
@@ -101,7 +94,7 @@ def family_of(branches: list[dict]) -> dict:
     reach = min(ends) - beyond, max(ends) + beyond
     circles = [_circle(law, nu, m, reach, bifurcations) for m in sorted(coverings)]
     for branch in branches:
-        for name in ("family", "reach", "title", *(["path"] if branch["shapes"] else [])):
+        for name in ("axes", "family", "reach", "title", *(["path"] if branch["shapes"] else [])):
             del branch[name]
     about = {"name": f"{law}, ν = {exact_text(nu)}", "law": law, "nu": nu, "parameter": "kappa_n"}
     return about | {"branches": branches, "circles": circles}

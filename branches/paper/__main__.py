@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from branches import interrupt
+from branches.store import interrupt
 
 if __name__ == "__main__":  # before the imports below, which take a second
     interrupt.begin("finished items are on the page")
@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from branches.display import Parser, complain, survive_any_encoding, write_output
-from branches.progress import Progress
+from branches.run.progress import Progress
+from branches.store.command import Parser, complain, survive_any_encoding, write_output
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
     from branches.paper.page import Section
@@ -48,24 +48,29 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
 }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Compute what is asked for and write the page; the exit code: 0, or 2 for a request that cannot be met."""
+def parser() -> Parser:
+    """Return the command line."""
     parser = Parser(
-        prog="python -m branches.paper",
-        description="The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
+        "paper",
+        "The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
         "published number stands beside ours. Items that earlier calls put on the page stay there.",
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
     parser.add_argument("items", nargs="*", metavar="ITEM", help=f"any of {', '.join(ITEMS)} (default: all)")
     parser.add_argument("--quiet", action="store_true", help="print only the last line")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Compute what is asked for and write the page; the exit code: 0, or 2 for a request that cannot be met."""
+    options = parser().parse_args(argv)
     survive_any_encoding()
     unknown = [name for name in options.items if name not in ITEMS]
     if unknown:
         complain(f"error: there is no item {', '.join(map(repr, unknown))}; known are {', '.join(ITEMS)}")
         return 2
     folder = Path(options.out)
-    from branches.files import StoreError, prepare
+    from branches.store.files import StoreError, prepare
 
     try:
         prepare(folder / "index.md")  # before the work, not after it

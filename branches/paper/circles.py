@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.draw_diagram import in_words
+from branches.draw.style import in_words
 from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, keep
 from branches.paper.page import Row, Section
 from ribbon_model.dispersion import coefficients, squared_frequencies

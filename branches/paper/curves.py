@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from branches.draw_diagram import colour_of
+from branches.draw.style import colour_of
 from branches.paper.draw import STABLE, keep
 from branches.paper.page import Row, Section
-from branches.stability import LABEL, Watch
+from branches.scene.index import LABEL, SymmetryWatch
 from contin import Settings, curve, trace
 from contin.lowlevel import locate_branch_point, point_of
 from ribbon_model import exact
@@ -87,7 +87,7 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
 def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, float]]]:
     """Where the branch that breaks all but one mirror leaves (m, n): (nu, kappa_n), shape (K, 2); its labelled points."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
-    settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, events=Watch(RIBBON, system, x).monitors)
+    settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, events=SymmetryWatch(RIBBON, system, x).monitors)
     first = next(point for point in trace(point_of(system, x), settings, tangent=tangent) if point.label == LABEL)
     system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)

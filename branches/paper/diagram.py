@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from branches import diagram_graph as diagram
-from branches.config import parse
-from branches.diagram import run_diagram
-from branches.display import Display
-from branches.draw_branch import figure as draw_branch
-from branches.draw_diagram import figure as draw_diagram
-from branches.job import whole_branch
+from branches.draw.picture import figure as draw_branch
+from branches.graph import closed as diagram
+from branches.graph.picture import figure as draw_diagram
+from branches.graph.preview import preview
+from branches.graph.stored import read
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
-from branches.preview import preview
-from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.run.runner import whole_branch
+from branches.scene.parse import parse
+from branches.store.read import read_branch
 from ribbon_model import exact
 from ribbon_model.laws import PAPER_LAWS
 
@@ -56,8 +57,8 @@ def fig11(folder: Path) -> Section:
 def fig12(folder: Path) -> Section:
     """All primary branches of m = 1, 3, 5, 7 for the three laws, by collocation; and the exact preview."""
     scene = parse(FIG12, "fig12")
-    run_diagram(scene, folder / "fig12", Display(quiet=True))
-    graph = diagram.read(folder / "fig12")
+    run_many(scene, folder / "fig12", Display(quiet=True))
+    graph = read(folder / "fig12")
     pictures = [keep(draw_diagram(graph, law, NU, WINDOW), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
     ahead = preview(parse(FIG12, "fig12", ["law=ribbon"]))
     pictures.insert(1, keep(draw_diagram(ahead, "ribbon", NU, WINDOW), folder, "fig12_preview"))

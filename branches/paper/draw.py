@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from branches.files import write_picture
+from branches.store.files import write_picture
 
 STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
 UNSTABLE_FILL = "#F3B48B"

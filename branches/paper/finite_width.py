@@ -9,13 +9,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from branches import diagram_graph as diagram
-from branches.config import parse
-from branches.diagram import run_diagram
-from branches.display import Display
-from branches.draw_diagram import CONJUGATE, NATURAL, colour_of, conjugate, legend
+from branches.draw.style import CONJUGATE, NATURAL, colour_of
+from branches.graph.picture import conjugate, legend
+from branches.graph.stored import read
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.scene.parse import parse
 from contin import Settings, curve, trace
 from contin.lowlevel import point_of
 from ribbon_model import exact
@@ -57,8 +58,8 @@ def finite_width(folder: Path) -> Section:
         "Below its birth (1, 2) leaves the single loop downwards, as a rod's branch does; above upwards, as the ribbon's.",
         "Branches that end inside the picture end where the strain energy is no longer convex (see docs/finite-width.md).",
     ]
-    run_diagram(parse(SCENE, "finite-width"), folder / "finite_width", Display(quiet=True))
-    graph = diagram.read(folder / "finite_width")
+    run_many(parse(SCENE, "finite-width"), folder / "finite_width", Display(quiet=True))
+    graph = read(folder / "finite_width")
     missing = [*json.loads(graph.graph["failed"]), *json.loads(graph.graph["absent"])]
     if missing:
         notes.append(f"Not in the picture, because they failed or begin outside its limits: {'; '.join(missing)}.")

@@ -7,8 +7,8 @@ import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from branches import interrupt
-from branches.files import StoreError, write_bytes
+from branches.store import interrupt
+from branches.store.files import StoreError, write_bytes
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.display import write_output
 from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
-from branches.shell import DEFAULT, Outcome, ShellError, compute, describe, read
+from branches.paper.shell_run import DEFAULT, Outcome, ShellError, compute, describe, read
+from branches.store.command import write_output
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.unfolding import FLAT, first_root
 

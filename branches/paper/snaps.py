@@ -100,13 +100,13 @@ def _past(limit: float, side: int) -> float:
 
 def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str = "") -> Start:
     """The state at a labelled point of a primary branch, with kappa_n moved on."""
-    from branches.stability import Watch
+    from branches.scene.index import SymmetryWatch
     from contin import Settings, trace
     from contin.lowlevel import point_of
     from ribbon_model.seeds import primary_branch
 
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
-    monitors = Watch(law, system, x).monitors if label == "SB" else ()
+    monitors = SymmetryWatch(law, system, x).monitors if label == "SB" else ()
     branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors), tangent=tangent)
     point = branch.labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
@@ -166,8 +166,9 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     """The strips on their way, at equal distances in the strains; the experiments' single loop first."""
     from matplotlib.figure import Figure
 
-    from branches.draw_diagram import in_words
-    from branches.draw_strip import draw_strip, reach_of, width_of
+    from branches.draw.solid import widest
+    from branches.draw.strip import ROOM, draw_strip, reach_of
+    from branches.draw.style import in_words
 
     films = sorted(films, key=lambda film: film[0].m)
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
@@ -175,7 +176,7 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
         line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {in_words(f'{start.kappa_n:.3f}')}", fontsize=12)
         shown = _frames(descent, frames)
         shapes = [strip.shape(241).placed(2 * math.pi) for strip in shown]
-        width = width_of({}, shapes, 0.25 / start.m)  # a circle of m turns has the radius 1/m
+        width = min(0.25 / start.m, *(ROOM * widest(shape) for shape in shapes))  # a circle of m turns has the radius 1/m
         reach = reach_of(shapes, width)
         for axes, strip, shape in zip(line.subplots(1, frames), shown, shapes):
             draw_strip(axes, shape, width, reach)

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from branches import diagram_graph as diagram
-from branches.config import parse
-from branches.diagram import run_diagram
-from branches.display import Display
-from branches.job import whole_branch
+from branches.graph import closed as diagram
+from branches.graph.stored import new_graph, read
 from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
 from branches.paper.draw import BUCKLED, STABLE, keep
 from branches.paper.page import Row, Section
-from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.run.runner import whole_branch
+from branches.scene.parse import parse
+from branches.store.read import read_branch
 from ribbon_model.laws import LAWS as LAW_OBJECTS
 from ribbon_model.linear import energy_interval
 from ribbon_model.linear import index as index_of_circle
@@ -29,8 +30,8 @@ STRIDE = 3
 def fig12b(folder: Path) -> Section:
     """Intervals of kappa_n with stable states, for the three laws."""
     scene = parse(FIG12.replace("stride: 20", f"stride: {STRIDE}"), "fig12b")
-    run_diagram(scene, folder / "fig12b", Display(quiet=True))
-    graph = diagram.read(folder / "fig12b")
+    run_many(scene, folder / "fig12b", Display(quiet=True))
+    graph = read(folder / "fig12b")
     found = {law: _stable_pieces(graph, folder / "fig12b", law) for law in LAWS}
     rows = []
     for law in LAWS:
@@ -112,7 +113,7 @@ def _with_secondary_bifurcations(folder: Path, law, nu, m, n) -> list[dict]:
     path = folder / f"index_{law.replace(' ', '_')}_m{m}_n{n}.h5"
     scene = f"{{law: {law}, nu: {nu}, m: {m}, n: {n}, stability: true, limits: {{kappa_n: [-100, 100]}}, stride: 50}}"
     whole_branch(parse(scene, "fig12b"), path, Display(silent=True))
-    graph = diagram.new_graph()
+    graph = new_graph()
     diagram.add_branch(graph, read_branch(path), path.name)
     return [data for _, _, data in graph.edges(data=True)]
 

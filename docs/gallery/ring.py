@@ -16,7 +16,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from branches.read import read_branch
-from branches.run import main as compute
+from branches.run.__main__ import main as compute
 
 Path("ring.yaml").write_text("""
 title: twisted ring

@@ -16,7 +16,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from branches.read import read_branch
-from branches.run import main as compute
+from branches.run.__main__ import main as compute
 
 Path("strip.yaml").write_text("""
 title: strip on edge with a load at its tip

@@ -11,13 +11,13 @@ from pathlib import Path
 
 from benchmarks.measure import SCRIPTS, environment, in_turn, median
 
-PACKAGES = ("numpy", "scipy.integrate", "numba", "contin", "ribbon_model.domains", "branches.job")
+PACKAGES = ("numpy", "scipy.integrate", "numba", "contin", "ribbon_model.domains", "branches.run.runner")
 #: `import contin` alone loads nothing: names are loaded when they are first used.
 STATEMENTS = {"contin": "from contin import BoundaryValueProblem, solve, trace"}
 CONFIG = SCRIPTS.parent / "configs" / "m1_n2.yaml"
 MODULES = """\
 import sys
-from branches.run import main
+from branches.run.__main__ import main
 code = main(sys.argv[1:])
 names = sorted({name.partition(".")[0] for name in sys.modules if not name.startswith("_")} - set(sys.stdlib_module_names))
 print("MODULES", len(sys.modules), *names)
@@ -38,7 +38,7 @@ def run(quick: bool) -> dict:
     return {
         "python": empty,
         "imports": {name: median(row["seconds"] for row in rows) - empty for name, rows in imports.items()},
-        "dearest": _importtime("branches.job")[:15],
+        "dearest": _importtime("branches.run.runner")[:15],
         "first_run": first["seconds"], "warm_run": median(row["seconds"] for row in warm),
         "modules": [name for name in warm[-1]["modules"] if not name.startswith("contin_")], "module_count": warm[-1]["count"],
     }  # fmt: skip
@@ -94,7 +94,7 @@ def table(results: dict) -> str:
         f"{results['first_run']:.1f} s the first time, with empty caches, and {results['warm_run']:.2f} s from then on. "
         f"It loads {results['module_count']} modules, beyond the standard library those of {', '.join(results['modules'])}.",
         "",
-        "Own time by package when `branches.job` is imported: "
+        "Own time by package when `branches.run.runner` is imported: "
         + ", ".join(f"{name} {1e3 * seconds:.0f} ms" for name, seconds in results["dearest"][:8])
         + ".",
     ]

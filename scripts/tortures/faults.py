@@ -58,7 +58,8 @@ def _killed_while_writing(scene: Scene, chance: random.Random) -> Run:
 
 
 def writers() -> tuple[str, ...]:
-    from branches import files, store
+    from branches.store import files
+    from branches.store import writer as store
     from contin.lowlevel import write_whole
 
     return files.__file__, store.__file__, write_whole.__code__.co_filename

@@ -101,7 +101,8 @@ def _child(folder: Path, argv: list[str], said: list[Path], progress, prepare) -
             os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666), number)
         sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
         os.chdir(folder)
-        from branches import interrupt, run
+        from branches.run import __main__ as run
+        from branches.store import interrupt
 
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -122,7 +123,7 @@ def _child(folder: Path, argv: list[str], said: list[Path], progress, prepare) -
 
 def _report(progress) -> None:
     """Let the writer report its progress, and write as often as possible."""
-    from branches.store import BranchWriter
+    from branches.store.writer import BranchWriter
 
     append, checkpoint = BranchWriter.append, BranchWriter.checkpoint
 

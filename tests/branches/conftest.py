@@ -32,7 +32,10 @@ class Silent:
     def begin(self, *arguments):
         pass
 
-    def point(self, point, number, step):
+    def stage(self, stage):
+        pass
+
+    def point(self, stage, point, number, step):
         if number in self.at:
             self.at[number]()
 

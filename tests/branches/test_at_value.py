@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from branches import at_value, graph
-from branches import diagram_graph as diagram
-from branches.at_value import EXACT, INTERPOLATED, SOLVED, holding, states_at
-from branches.config import parse
-from branches.diagram import run_diagram
-from branches.display import Display
-from branches.preview import preview
+import branches
+from branches.graph import __main__ as graph
+from branches.graph import at_value
+from branches.graph.at_value import EXACT, INTERPOLATED, SOLVED, holding, states_at
+from branches.graph.preview import preview
+from branches.graph.stored import read
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.scene.parse import parse
 from ribbon_model import exact
 
 SCENE = "{law: ribbon, pairs: [[1, 2], [3, 5], [1, 3]], nu: 0.3, limits: {kappa_n: [-60, 100]}, stride: 10}"
@@ -27,7 +29,7 @@ PLACES = [*np.random.default_rng(3).uniform(-8, 8, 12).round(3).tolist(), 4.0, 4
 def folder(tmp_path_factory):
     """The folder of a small diagram in which every tenth solution is kept."""
     path = tmp_path_factory.mktemp("at_value") / "diagram"
-    run_diagram(parse(SCENE, "scene"), path, Display(silent=True))
+    run_many(parse(SCENE, "scene"), path, Display(silent=True))
     return path
 
 
@@ -52,7 +54,7 @@ def on_branch(states, mode):
 @pytest.mark.parametrize("kappa_n", PLACES)
 def test_a_state_is_solved_to_its_error(folder, kappa_n):
     """Interpolated, kappa* was off by 7e-5 and the energy by 4e-4 at kappa_n = 3, with eight digits after the point."""
-    states = states_at(diagram.read(folder), kappa_n, folder)
+    states = states_at(read(folder), kappa_n, folder)
     for mode in ((1, 2), (3, 5), (1, 3)):
         found, expected = on_branch(states, mode), truth(mode, kappa_n)
         assert len(found) == len(expected)
@@ -65,7 +67,7 @@ def test_a_state_is_solved_to_its_error(folder, kappa_n):
 
 @pytest.mark.parametrize("kappa_n", PLACES)
 def test_without_the_files_the_digits_hold_and_the_word_is_there(folder, kappa_n):
-    states = states_at(diagram.read(folder), kappa_n)
+    states = states_at(read(folder), kappa_n)
     for mode in ((1, 2), (3, 5), (1, 3)):
         for state, values in zip(on_branch(states, mode), truth(mode, kappa_n)):
             assert state.source == INTERPOLATED
@@ -97,7 +99,7 @@ def test_a_file_that_cannot_be_read_gives_the_interpolated_digits(folder, tmp_pa
     shutil.copytree(folder, tmp_path / "broken")
     for path in (tmp_path / "broken").glob("*_m1_n2.h5"):
         path.write_bytes(b"")
-    states = states_at(diagram.read(tmp_path / "broken"), 3.0, tmp_path / "broken")
+    states = states_at(read(tmp_path / "broken"), 3.0, tmp_path / "broken")
     assert {state.source for state in on_branch(states, (1, 2))} == {INTERPOLATED}
     assert {state.source for state in on_branch(states, (3, 5))} == {SOLVED}
 
@@ -105,7 +107,7 @@ def test_a_file_that_cannot_be_read_gives_the_interpolated_digits(folder, tmp_pa
 def test_another_state_is_not_taken_for_the_one_that_was_interpolated(folder, monkeypatch):
     """Newton's method may arrive at another branch; here it is made to."""
     monkeypatch.setattr(at_value, "solved", lambda *_: ({"kappa_star": 2.9, "energy": -4.0}, {"kappa_star": 0, "energy": 0}))
-    states = states_at(diagram.read(folder), 3.0, folder)
+    states = states_at(read(folder), 3.0, folder)
     assert all(state.source == INTERPOLATED for state in states if "branch" in state.about)
 
 
@@ -128,7 +130,7 @@ def test_the_page_estimates_the_error_of_what_it_interpolates():
     node = shutil.which("node")
     if node is None:
         pytest.skip("needs node")
-    source = Path(graph.__file__).parent / "explore" / "branch.js"
+    source = Path(branches.__file__).parent / "explore" / "branch.js"
     s = np.cumsum([0, 0.3, 0.2, 0.35, 0.3, 0.15, 0.3, 0.4, 0.3]).tolist()
     program = f"""{source.read_text(encoding="utf-8").replace('"use strict";', "")}
     const branch = Object.create(Branch.prototype, {{ columns: {{ value: {{ a: {s}, f: {np.cos(s).tolist()} }} }} }});

@@ -14,7 +14,7 @@ PROGRAM = ("-m", "branches.cli")
 
 
 def test_every_command_is_a_module_and_every_program_is_a_command(root):
-    assert all(importlib.util.find_spec(f"branches.{name}") for name in cli.COMMANDS)
+    assert all(importlib.util.find_spec(module) for module, _ in cli.COMMANDS.values())
     programs = {path.stem for path in (root / "branches").glob("*.py") if '__name__ == "__main__"' in path.read_text()}
     programs |= {path.parent.name for path in (root / "branches").glob("*/__main__.py")}
     assert programs - {"cli"} == set(cli.COMMANDS)
@@ -66,17 +66,31 @@ def test_bash_completes(line, wanted, command, tmp_path):
     (tmp_path / "scene.yaml").touch()
     (tmp_path / "completion.sh").write_text(command("completion", "bash", program=PROGRAM).out)
     words = " ".join(f"'{word}'" for word in line.split())
-    program = f"source completion.sh; COMP_WORDS=({words}); COMP_CWORD={len(line.split()) - 1}; _ribbon; echo ${{COMPREPLY[@]}}"
+    program = (
+        f"source completion.sh; COMP_WORDS=({words}); COMP_CWORD={len(line.split()) - 1}; COMP_LINE='{line}'; "
+        "COMP_POINT=${#COMP_LINE}; _shtab_ribbon; echo ${COMPREPLY[@]}"
+    )
     assert subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=tmp_path).stdout == wanted + "\n"
 
 
 @pytest.mark.full
 def test_completion_of_other_shells(command):
-    fish = command("completion", "fish", program=PROGRAM).out
-    assert "-a secondary" in fish and "'__fish_seen_subcommand_from run' -l overwrite" in fish
-    assert "bashcompinit" in command("completion", "zsh", program=PROGRAM).out
-    wrong = command("completion", "tcsh", program=PROGRAM)
-    assert (wrong.returncode, wrong.err) == (2, "error: completion: must be followed by one of bash, zsh, fish\n")
+    assert "--overwrite" in command("completion", "zsh", program=PROGRAM).out
+    wrong = command("completion", "pwsh", program=PROGRAM)
+    assert wrong.returncode == 2 and wrong.err.startswith("error: completion: must be followed by one of bash, zsh")
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_help_names_the_command_that_was_typed(command, name):
+    assert command(name, "--help", program=PROGRAM).out.startswith(f"usage: ribbon {name} ")
+    assert command("--help", program=("-m", f"branches.{name}")).out.startswith(f"usage: python -m branches.{name} ")
+
+
+def test_scenes_of_the_package_are_listed_and_run_by_name(command, root):
+    listed = command("scenes", program=PROGRAM).out
+    assert [line.split()[0] for line in listed.splitlines()] == sorted(file.stem for file in (root / "configs").glob("*.yaml"))
+    done = command("run", "m1_n2", "--quiet", "--set", "steps.max_points=3", program=PROGRAM)
+    assert done.returncode == 0 and (command.folder / "m1_n2.h5").exists()
 
 
 def test_it_is_installed_as_ribbon(root):

@@ -6,7 +6,9 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from branches.config import Config, ConfigError, dump, load, parse
+from branches.scene.closed import ClosedScene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, load, parse
 from ribbon_model.domains import DOMAINS, LOOP
 
 SCENE = "m: 1\nn: 2\n"
@@ -134,7 +136,7 @@ TITLES = ["", "1e-3", "yes", "null", "0x10", "1:30", "2020-01-01", "é ± \U0001
 
 @pytest.mark.parametrize("title", TITLES)
 def test_what_is_written_is_read_back(title):
-    config = Config(
+    config = ClosedScene(
         title=title, m=3, n=5, nu=1e-7, limits={"M2": (-1e-5, 3)}, zeros={"kappa_n": [1, 2.5]},
         mesh={"tolerance": 1e-9}, steps={"first": 1e-3, "largest": 1e30},
     )  # fmt: skip
@@ -143,12 +145,12 @@ def test_what_is_written_is_read_back(title):
 
 def test_the_first_step_is_chosen_within_its_bounds():
     for steps, first in ({}, 0.05), ({"largest": 0.01}, 0.01), ({"smallest": 0.2}, 0.2), ({"first": 0.3}, 0.3):
-        assert Config(m=1, n=2, steps=steps).steps.first_step == first
+        assert ClosedScene(m=1, n=2, steps=steps).steps.first_step == first
 
 
 def test_the_start_of_a_branch():
     """Equation (27): kappa_n = m (2 n^2 - m^2) / (m^2 + 2 nu (n^2 - m^2)) = 3 * 23 / 13.2 for (3, 4) at nu = 0.3."""
-    start = Config(m=3, n=4).at_bifurcation()
+    start = ClosedScene(m=3, n=4).at_bifurcation()
     assert math.isclose(start["kappa_n"], 69 / 13.2, rel_tol=1e-14)
     assert (start["kappa_star"], start["M2"]) == (3, 0)
     assert math.isclose(start["M1"], 3 - 69 / 13.2) and math.isclose(start["energy"], 4.5 - 3 * 69 / 13.2)
@@ -156,15 +158,15 @@ def test_the_start_of_a_branch():
 
 def test_a_scene_is_not_changed_once_made():
     with pytest.raises(ValidationError):
-        Config(m=1, n=2).nu = 0.1
+        ClosedScene(m=1, n=2).nu = 0.1
 
 
 def test_domains_are_those_of_the_model():
-    assert {*get_args(Config.model_fields["domain"].annotation), LOOP.name} == set(DOMAINS)
+    assert {*get_args(ClosedScene.model_fields["domain"].annotation), LOOP.name} == set(DOMAINS)
 
 
 def test_the_half_loop_takes_what_the_cell_cannot():
-    assert Config(m=2, n=1, domain="half loop").m == 2
+    assert ClosedScene(m=2, n=1, domain="half loop").m == 2
 
 
 def test_files_that_are_no_scene(tmp_path):

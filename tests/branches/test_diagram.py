@@ -16,23 +16,24 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from branches import diagram as diagrams
-from branches import diagram_graph as diagram
-from branches import draw_diagram, job
-from branches import executor as executors
-from branches.config import ConfigError, parse
-from branches.diagram import run_diagram
-from branches.disentangle import crossings
-from branches.display import Display
-from branches.executor import ExecutorError, executor
 from branches.explore.gather import gather
-from branches.files import StoreError, only_run
-from branches.graph import main as graph_command
-from branches.interpolation import places
-from branches.names import primary_file
-from branches.preview import preview
+from branches.graph import closed as diagram
+from branches.graph import picture as draw_diagram
+from branches.graph.__main__ import main as graph_command
+from branches.graph.disentangle import crossings
+from branches.graph.interpolation import places
+from branches.graph.preview import preview
+from branches.graph.stored import read
 from branches.read import read_branch
-from branches.run import main as run_command
+from branches.run import executor as executors
+from branches.run import many as diagrams
+from branches.run.__main__ import main as run_command
+from branches.run.display import Display
+from branches.run.executor import ExecutorError, executor
+from branches.run.many import run_many
+from branches.scene.fields import ConfigError
+from branches.scene.parse import parse
+from branches.store.files import StoreError, only_run
 from ribbon_model import exact
 
 #: Fig. 12a of Audoly & Seffen (2015), a part of it: all ends of m = 1 and 3 up to n = 4.
@@ -42,18 +43,18 @@ SCENE = "{law: ribbon, nu: 0.3, m: [1, 3, 5], n: [1, 2, 3, 4], limits: {kappa_n:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagram")
-    assert run_diagram(parse(SCENE, "scene"), folder, Display(silent=True)) == "complete"
+    assert run_many(parse(SCENE, "scene"), folder, Display(silent=True)) == "complete"
     return folder
 
 
 def test_every_branch_once(folder):
     """Of 10 pairs (m, n) three are another one from its other end: (3, 2), (5, 3) and (5, 4)."""
-    graph = diagram.read(folder)
+    graph = read(folder)
     assert [family[2:] for family in diagram.families(graph)] == [(1, 2), (1, 3), (1, 4), (3, 1), (3, 4), (5, 1), (5, 2)]
 
 
 def test_folds_and_ends_are_those_of_the_quadrature(folder):
-    graph = diagram.read(folder)
+    graph = read(folder)
     for law, nu, m, n in diagram.families(graph):
         (branch,) = diagram.course(graph, m, n, law, nu)
         found = [node["kappa_n"] for node in branch["nodes"] if node["kind"] == "fold"]
@@ -68,7 +69,7 @@ def test_folds_and_ends_are_those_of_the_quadrature(folder):
 
 
 def test_where_does_a_branch_go_from_either_end(folder):
-    graph = diagram.read(folder)
+    graph = read(folder)
     (there,), (back,) = diagram.course(graph, 1, 3), diagram.course(graph, 5, 3)
     kinds = [node["kind"] for node in there["nodes"]]
     assert kinds == ["circle", "fold", "fold", "circle"]
@@ -79,7 +80,7 @@ def test_where_does_a_branch_go_from_either_end(folder):
 
 def test_states_at_a_curvature_against_the_quadrature(folder):
     """At kappa_n = 3.2 the branch (1, 2) has two states; kappa* from the exact curve, the circles' energy m^2/2 - m kappa_n."""
-    states = diagram.states_at(diagram.read(folder), 3.2)
+    states = diagram.states_at(read(folder), 3.2)
     found = sorted(state["kappa_star"] for state in states if state.get("branch") == (1, 2))
     expected = [exact.solve(1, 2, 0.3, guess, kappa_n=3.2).kappa_star for guess in _guesses(1, 2, 3.2)]
     assert found == pytest.approx(sorted(expected), abs=1e-5)
@@ -119,14 +120,14 @@ def _guesses(m, n, kappa_n):
 
 
 def test_folds_in_a_window(folder):
-    found = diagram.folds(diagram.read(folder), -8, 14)
+    found = diagram.folds(read(folder), -8, 14)
     expected = [p.kappa_n for m, n in ((1, 2), (1, 3), (3, 4)) for p in exact.folds(m, n, 0.3)]
     assert [node["kappa_n"] for node in found] == pytest.approx(sorted(k for k in expected if -8 < k < 14), abs=1e-9)
 
 
 def test_exports(folder):
     """GraphML holds the same nodes and edges, with the same columns as text."""
-    graph = diagram.read(folder)
+    graph = read(folder)
     other = networkx.read_graphml(folder / "diagram.graphml", force_multigraph=True)
     assert set(other) == set(graph) and other.number_of_edges() == graph.number_of_edges()
     ours, theirs = ({data["file"]: data for _, _, data in edges.edges(data=True)} for edges in (graph, other))
@@ -139,11 +140,11 @@ def test_exports(folder):
 
 def test_a_second_run_computes_what_is_missing_only(folder, capsys):
     scene = parse(SCENE, "scene")
-    gone = folder / primary_file(scene.branches[1])
+    gone = folder / list(scene.scenes)[1]
     before = {path: path.stat().st_mtime_ns for path in folder.glob("*.h5") if path != gone}
     image = read_branch(gone).points
     gone.unlink()
-    run_diagram(scene, folder, Display())
+    run_many(scene, folder, Display())
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert np.array_equal(read_branch(gone).points, image)
     assert "computed before" in capsys.readouterr().out
@@ -156,7 +157,7 @@ def test_a_second_run_computes_what_is_missing_only(folder, capsys):
 def test_a_folder_of_another_scene_is_refused(folder, change, said):
     before = {path: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(StoreError, match="holds another scene") as caught:
-        run_diagram(parse(SCENE, "scene", [change]), folder, Display(silent=True))
+        run_many(parse(SCENE, "scene", [change]), folder, Display(silent=True))
     assert said in str(caught.value) and "--overwrite replaces its diagram" in str(caught.value)
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -164,14 +165,14 @@ def test_a_folder_of_another_scene_is_refused(folder, change, said):
 def test_a_scene_with_more_branches_goes_on_and_overwrite_replaces(tmp_path):
     limits = "limits: {kappa_n: [0, 100]}, stride: 50"
     for nu in ("[0.3]", "[0.3, 0.31]"):
-        run_diagram(parse(f"{{m: 1, n: 2, nu: {nu}, {limits}}}", "scene"), tmp_path, Display(silent=True))
-    assert [family[1] for family in diagram.families(diagram.read(tmp_path))] == [0.3, 0.31]
+        run_many(parse(f"{{m: 1, n: 2, nu: {nu}, {limits}}}", "scene"), tmp_path, Display(silent=True))
+    assert [family[1] for family in diagram.families(read(tmp_path))] == [0.3, 0.31]
     other = parse(f"{{m: 1, n: 2, nu: [0.32], {limits}}}", "scene")
-    assert run_diagram(other, tmp_path, Display(silent=True), overwrite=True) == "complete"
-    assert [family[1] for family in diagram.families(diagram.read(tmp_path))] == [0.32]
+    assert run_many(other, tmp_path, Display(silent=True), overwrite=True) == "complete"
+    assert [family[1] for family in diagram.families(read(tmp_path))] == [0.32]
     (tmp_path / "diagram.json").write_text("{}")
     with pytest.raises(StoreError, match="not a result of branches.run"):
-        run_diagram(other, tmp_path, Display(silent=True))
+        run_many(other, tmp_path, Display(silent=True))
 
 
 PAIR = "{m: [3], n: [4, 5], stride: 20}"
@@ -181,12 +182,12 @@ PAIR = "{m: [3], n: [4, 5], stride: 20}"
 def computed_here(tmp_path_factory):
     """Two branches, computed by this process: their points."""
     folder, scene = tmp_path_factory.mktemp("one"), parse(PAIR, "scene")
-    run_diagram(scene, folder, Display(silent=True), workers=1)
-    return [read_branch(folder / primary_file(config)).points for config in scene.branches]
+    run_many(scene, folder, Display(silent=True), workers=1)
+    return [read_branch(folder / file).points for file in scene.scenes]
 
 
 def points_of(folder):
-    return [read_branch(folder / primary_file(config)).points for config in parse(PAIR, "scene").branches]
+    return [read_branch(folder / file).points for file in parse(PAIR, "scene").scenes]
 
 
 @pytest.mark.full
@@ -195,14 +196,14 @@ def test_a_cluster_makes_no_difference(computed_here, tmp_path):
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
     scene = parse(PAIR, "scene")
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        run_diagram(scene, tmp_path / "dask", Display(silent=True), scheduler=cluster.scheduler_address)
+        run_many(scene, tmp_path / "dask", Display(silent=True), scheduler=cluster.scheduler_address)
     assert all(map(np.array_equal, computed_here, points_of(tmp_path / "dask")))
 
 
 @pytest.mark.full
 @pytest.mark.forks("workers inherit what the test has replaced")
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
-    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), job.compute_branch
+    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), diagrams.compute_scene
 
     def troubled(config, display):
         if (config.m, config.n) == (1, 4):
@@ -211,16 +212,16 @@ def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatc
             time.sleep(60)
         return compute(config, display)
 
-    monkeypatch.setattr(job, "compute_branch", troubled)
-    assert run_diagram(scene, tmp_path, Display(), workers=2, time_limit=5) == "lost"
-    graph = diagram.read(tmp_path)
+    monkeypatch.setattr(diagrams, "compute_scene", troubled)
+    assert run_many(scene, tmp_path, Display(), workers=2, time_limit=5) == "lost"
+    graph = read(tmp_path)
     assert [family[2:] for family in diagram.families(graph)] == [(1, 2)]
     failed = json.loads(graph.graph["failed"])
-    reasons = [failed[primary_file(scene.branches[i])] for i in (1, 3)]
+    reasons = [failed[list(scene.scenes)[i]] for i in (1, 3)]
     assert reasons == ["its process died (exit code -9)", "not finished within the time limit"]
     assert "failed" in capsys.readouterr().out
     monkeypatch.undo()
-    assert run_diagram(scene, tmp_path, Display(), workers=2) == "complete"
+    assert run_many(scene, tmp_path, Display(), workers=2) == "complete"
     assert "1 of them computed before" in capsys.readouterr().out
 
 
@@ -265,7 +266,7 @@ def test_a_process_killed_while_it_sends_its_result():
 def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkeypatch, method):
     """Forked, or each from nothing as on Windows and macOS: the same bits as from one process."""
     monkeypatch.setattr(executors, "_start_method", lambda: method)
-    run_diagram(parse(PAIR, "scene"), tmp_path, Display(silent=True), workers=2)
+    run_many(parse(PAIR, "scene"), tmp_path, Display(silent=True), workers=2)
     assert all(map(np.array_equal, computed_here, points_of(tmp_path)))
 
 
@@ -273,8 +274,9 @@ def test_the_order_in_which_processes_are_done_makes_no_difference(tmp_path, mon
     """The same files, and the failed branches in the same order."""
     scene, compute, files = parse("{m: [1, 3], n: [4, 5], stride: 20}", "scene"), diagrams.compute, []
 
-    def failing(config):
-        return RuntimeError(f"({config.m}, {config.n})") if config.n == 5 else compute(config)
+    def failing(job):
+        config = scene.scenes[job[0]]
+        return RuntimeError(f"({config.m}, {config.n})") if config.n == 5 else compute(job)
 
     for order in (list, reversed):
 
@@ -286,7 +288,7 @@ def test_the_order_in_which_processes_are_done_makes_no_difference(tmp_path, mon
 
         monkeypatch.setattr(diagrams, "run_jobs", finished)
         folder = tmp_path / order.__name__
-        assert run_diagram(scene, folder, Display(silent=True), workers=1) == "lost"
+        assert run_many(scene, folder, Display(silent=True), workers=1) == "lost"
         files.append([(folder / name).read_bytes() for name in ("diagram.json", "diagram.graphml")])
     assert files[0] == files[1]
 
@@ -294,7 +296,7 @@ def test_the_order_in_which_processes_are_done_makes_no_difference(tmp_path, mon
 def test_two_runs_into_one_folder(tmp_path):
     scene = parse(PAIR, "scene")
     with only_run(tmp_path / "diagram.json"), pytest.raises(StoreError, match="another run"):
-        run_diagram(scene, tmp_path, Display(silent=True))
+        run_many(scene, tmp_path, Display(silent=True))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -332,7 +334,7 @@ def test_a_scheduler_without_workers_is_refused(tmp_path, call, monkeypatch):
 
 def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
     scene = parse("{law: [ribbon, flat rod], nu: [0.3, -0.9], pairs: [[1, 2], [3, 4]]}", "scene")
-    assert len(scene.branches) == 6
+    assert len(scene.scenes) == 6
     assert list(scene.absent) == ["ribbon, nu = -0.9, (1, 2)", "ribbon, nu = -0.9, (3, 4)"]
     assert "twisting modulus" in scene.absent["ribbon, nu = -0.9, (1, 2)"]
 
@@ -342,7 +344,7 @@ def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
     [
         ("{m: [1, 2.5], n: 2}", "m: "),
         ("{m: [1], n: [1]}", "none of its branches"),
-        ("{m: [], n: [1]}", "m: the list is empty"),
+        ("{m: [], n: [1]}", "m: .*the list is empty"),
         ("{m: [1, 1], n: [2]}", r"ribbon, nu = 0.3, \(1, 2\) is listed twice"),
         ("{m: 1, n: 2, nu: [0.3, 0.3]}", r"ribbon, nu = 0.3, \(1, 2\) is listed twice"),
         ("{m: 1, n: 2, nu: [0, 0.0]}", "nu = 0, .* is listed twice"),
@@ -364,7 +366,7 @@ def close(tmp_path_factory):
     """Two values of nu that agree in six digits."""
     folder = tmp_path_factory.mktemp("close")
     scene = parse("{m: 1, n: 2, nu: [0.3, 0.3000001], limits: {kappa_n: [0, 100]}, stride: 50}", "scene")
-    assert run_diagram(scene, folder, Display(), workers=1) == "complete"
+    assert run_many(scene, folder, Display(), workers=1) == "complete"
     return folder
 
 
@@ -373,7 +375,7 @@ def test_values_that_agree_in_six_digits_are_two_branches(close, capsys):
     names = ["ribbon_nu0.3000001_m1_n2.h5", "ribbon_nu0.3_m1_n2.h5"]
     assert sorted(path.name for path in close.glob("*.h5")) == names
     assert [read_branch(close / name).config["nu"] for name in names] == [0.3000001, 0.3]
-    graph = diagram.read(close)
+    graph = read(close)
     assert diagram.families(graph) == [("ribbon", 0.3, 1, 2), ("ribbon", 0.3000001, 1, 2)]
     for nu in (0.3, 0.3000001):
         (branch,) = diagram.course(graph, 1, 2, nu=nu)
@@ -384,12 +386,12 @@ def test_values_that_agree_in_six_digits_are_two_branches(close, capsys):
     assert "  ribbon, nu = 0.3, (1, 2): " in said and "  ribbon, nu = 0.3000001, (1, 2): " in said
     scene = parse("{m: 1, n: 2, nu: [0.3, 0.3000001], limits: {kappa_n: [0, 100]}, stride: 50}", "scene")
     assert diagram.families(preview(scene)) == diagram.families(graph)
-    assert run_diagram(scene, close, Display()) == "complete"
+    assert run_many(scene, close, Display()) == "complete"
     assert "2 of them computed before" in capsys.readouterr().out
 
 
 def test_pictures_and_pages_of_close_values_have_titles_of_their_own(close):
-    graph = diagram.read(close)
+    graph = read(close)
     titles = {draw_diagram.figure(graph, "ribbon", nu, disentangle=False).get_suptitle() for nu in (0.3, 0.3000001)}
     tables = {read_branch(path)._repr_html_().partition("nu = ")[2].partition("<")[0] for path in close.glob("*.h5")}
     assert len(titles) == len(tables) == 2
@@ -421,7 +423,7 @@ def test_an_interrupted_diagram_leaves_no_process_and_goes_on(command, tmp_path)
 
 def test_the_preview_is_the_diagram(folder):
     """From the quadrature alone: the same nodes (folds and ends to 1e-8) and the same answers, and it says what it is."""
-    computed, ahead = diagram.read(folder), preview(parse(SCENE, "scene"))
+    computed, ahead = read(folder), preview(parse(SCENE, "scene"))
     assert "exact quadrature" in ahead.graph["source"] and "source" not in computed.graph
     assert diagram.families(ahead) == diagram.families(computed)
     for _, _, m, n in diagram.families(computed):
@@ -435,7 +437,7 @@ def test_the_preview_is_the_diagram(folder):
 
 
 def test_disentangled_lines_cross_less_and_keep_kappa_n(folder):
-    graph, window = diagram.read(folder), (-8.0, 14.0)
+    graph, window = read(folder), (-8.0, 14.0)
     lines = draw_diagram.lines(graph, "ribbon", 0.3)
 
     def count(heights):
@@ -473,7 +475,7 @@ def test_the_work_for_a_branch_does_not_grow_with_the_diagram(tmp_path, monkeypa
 
     @contextlib.contextmanager
     def at_once(*options):
-        yield lambda function, config: _done((b"", "", _course(config))), executors.first_done, 1
+        yield lambda function, job: _done((b"", "", _course(parse(job[1], "job")))), executors.first_done, 1
 
     monkeypatch.setattr(diagrams, "executor", at_once)
     monkeypatch.setattr(diagrams, "write_bytes", lambda path, data: None)
@@ -483,11 +485,11 @@ def test_the_work_for_a_branch_does_not_grow_with_the_diagram(tmp_path, monkeypa
         scene, counter = parse(f"{{m: 1, n: 2, nu: {[k / 1000 for k in range(count)]}}}", "scene"), itertools.count()
         sys.setprofile(lambda frame, event, argument, counter=counter: next(counter) if event == "call" else None)
         try:
-            run_diagram(scene, tmp_path / str(count), Display())
+            run_many(scene, tmp_path / str(count), Display())
         finally:
             sys.setprofile(None)
         calls[count] = next(counter) / count
-        assert len(diagram.families(diagram.read(tmp_path / str(count)))) == count
+        assert len(diagram.families(read(tmp_path / str(count)))) == count
     assert calls[240] < calls[60]
 
 
@@ -503,4 +505,4 @@ def _course(config):
     family = {"law": config.law, "nu": config.nu, "m": config.m, "n": config.n}
     values = {"kappa_n": 1.0, "kappa_star": 1.0, "energy": -0.5}
     nodes = [diagram.node(family, kind, values, number) for number, kind in enumerate(("circle", "leaves"))]
-    return diagram.Course(family, nodes, [dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])])
+    return diagram.Course(family, config.file, config.name, nodes, [dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])])

@@ -5,9 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from branches.config import Config
-from branches.display import Display
-from branches.job import begun, compute_branch
+from branches.run.display import Display
+from branches.run.runner import compute_scene
+from branches.scene.closed import ClosedScene
+from branches.scene.stages import stages_of
 from contin.core.newton import correct
 
 #: Scenes whose points were wrong by as much as the last number, with newton_error 1e-14: of M1, kappa* and energy.
@@ -34,7 +35,7 @@ def difference(point):
 @pytest.mark.parametrize("name", SCENES)
 def test_every_accepted_point_is_as_exact_as_its_mesh_should_be(name):
     scene, _ = SCENES[name]
-    run, _ = begun(Config(**scene))
+    run = stages_of(ClosedScene(**scene))[0].start()
     points = [point for point in run if not point.label]
     for point in points:
         # a few times the tolerance, 1e-12, is round-off of a convex minimum at every point; where the energy ceases to be
@@ -47,7 +48,7 @@ def test_every_accepted_point_is_as_exact_as_its_mesh_should_be(name):
 def test_the_same_errors_are_stated_where_the_mesh_is_kept(name):
     """Without adaptation the errors are large; what is stated is not less than a fifth of them, where they are 1e-3."""
     scene, was = SCENES[name]
-    run, _ = begun(Config(**scene, mesh={"intervals": 12}))
+    run = stages_of(ClosedScene(**scene, mesh={"intervals": 12}))[0].start()
     run.settings = dataclasses.replace(run.settings, mesh=dataclasses.replace(run.settings.mesh, every=0), errors=False)
     worst = 0.0
     for point in run:
@@ -61,13 +62,13 @@ def test_the_same_errors_are_stated_where_the_mesh_is_kept(name):
 @pytest.mark.full
 def test_the_named_case_ends_where_the_law_does():
     """The stop was a whole unit late, at 23.63; it is at 22.6558 on meshes of 400 to 2000 intervals, within what is stated."""
-    run, _ = begun(Config(**SCENES["the named case"][0]))
+    run = stages_of(ClosedScene(**SCENES["the named case"][0]))[0].start()
     *_, last = run
     assert last.name == "the end of the convex strain energy" and last.discretization_error < 5e-4
     assert last["kappa_n"] == pytest.approx(22.6558, abs=5e-4 + last.discretization_error * (1 + 22.66))
 
 
 def test_files_hold_the_column():
-    found = compute_branch(Config(m=1, n=2), Display(silent=True))
+    found = compute_scene(ClosedScene(m=1, n=2), Display(silent=True))
     errors = found.points["discretization_error"]
     assert np.all((errors < 1e-11) | np.isnan(errors)) and np.isfinite(errors[1:]).all()

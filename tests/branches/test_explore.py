@@ -16,9 +16,6 @@ from browser import CHROMIUM, Browser
 from matplotlib.image import imread
 
 import contin
-from branches.config import Config, parse
-from branches.diagram import run_diagram
-from branches.display import Display
 from branches.explore import gather as gather_module
 from branches.explore.__main__ import main
 from branches.explore.gather import gather
@@ -26,9 +23,13 @@ from branches.explore.packing import TOLERANCE
 from branches.explore.packing import column as packed_column
 from branches.explore.solutions import solutions
 from branches.explore.strips import shapes
-from branches.files import StoreError
-from branches.job import run_branch
 from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
+from branches.scene.parse import parse
+from branches.store.files import StoreError
 from ribbon_model import exact
 
 FIG_12 = "{title: Fig. 12a, law: ribbon, nu: 0.3, m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], stride: 10}"
@@ -41,9 +42,9 @@ def results(tmp_path_factory):
     """Folder with m1_n2.h5 (with the index), and the diagrams fig12 and laws."""
     folder = tmp_path_factory.mktemp("explore")
     silent = Display(silent=True)
-    run_branch(Config(title="</script> & <b>", m=1, n=2, stability=True), folder / "m1_n2.h5", silent)
+    run_scene(ClosedScene(title="</script> & <b>", m=1, n=2, stability=True), folder / "m1_n2.h5", silent)
     for name, scene in (("fig12", FIG_12), ("laws", LAWS)):
-        assert run_diagram(parse(scene, "scene"), folder / name, silent) == "complete"
+        assert run_many(parse(scene, "scene"), folder / name, silent) == "complete"
     return folder
 
 
@@ -109,7 +110,7 @@ def test_columns_are_those_of_the_file(pages):
         points = file["points"][:]
     for name in ("kappa_n", "kappa_star", "energy", "index"):
         assert np.array_equal(column(branch, name), points[name])
-    assert Config.model_validate(parse(branch["config"], "config").model_dump()).m == 1
+    assert ClosedScene.model_validate(parse(branch["config"], "config").model_dump()).m == 1
     assert [mark["kind"] for mark in branch["marks"]] == ["circle", "fold", "circle"]
     assert [circle["m"] for circle in family["circles"]] == [1, 3]
 
@@ -136,7 +137,7 @@ def test_shapes_between_kept_solutions_are_those_of_a_run_that_keeps_all(results
         files = []
         for stride in (1, 10):
             files.append(tmp_path / f"{m}{n}{stride}.h5")
-            run_branch(Config(m=m, n=n, nu=nu, stride=stride), files[-1], Display(silent=True))
+            run_scene(ClosedScene(m=m, n=n, nu=nu, stride=stride), files[-1], Display(silent=True))
         every, tenth = (shapes(read_branch(path)) for path in files)
         assert every.shape == tenth.shape
         assert (np.abs(every - tenth).max(axis=(0, 1)) < TOLERANCE * np.abs(every).max(axis=(0, 1))).all()

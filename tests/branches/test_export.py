@@ -1,5 +1,6 @@
 """A strip as a file for other programs, each read by a library that did not write it where there is one; a branch as a film."""
 
+import dataclasses
 import json
 import math
 import shutil
@@ -12,11 +13,11 @@ import h5py
 import numpy as np
 import pytest
 
-from branches import export
-from branches.config import Config
-from branches.job import run_branch
+from branches.draw.solid import solid, thickest, widest
+from branches.export import __main__ as export
 from branches.read import read_branch
-from branches.solid import solid, thickest, widest
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
 
 WIDTH, THICKNESS = 0.06, 0.004
 
@@ -25,7 +26,7 @@ WIDTH, THICKNESS = 0.06, 0.004
 def results(tmp_path_factory, silent):
     """The branch (1, 2) of the ribbon."""
     folder = tmp_path_factory.mktemp("results")
-    run_branch(Config(m=1, n=2), folder / "m1_n2.h5", silent())
+    run_scene(ClosedScene(m=1, n=2), folder / "m1_n2.h5", silent())
     return folder / "m1_n2.h5"
 
 
@@ -121,11 +122,11 @@ def _along(mesh, shape):
 
 def test_a_law_of_rods_has_straight_sections_and_Gamma_gives_a_width(results):
     branch = read_branch(results)
-    options = export.arguments(["x.h5", "--point", "LP", "--out", "x.stl", "--length", "10", "--thickness", "0.02"])
-    wide = type(branch)(**(vars(branch) | {"config": branch.config | {"Gamma": 4.0}}))
+    options = export.parser().parse_args(["x.h5", "--point", "LP", "--out", "x.stl", "--length", "10", "--thickness", "0.02"])
+    wide = dataclasses.replace(branch, scene=branch.scene.model_copy(update={"Gamma": 4.0}))
     assert wide.width_at(10, options.thickness) == pytest.approx(math.sqrt(4.0 * 0.02 * 10 / (2 * math.pi)))
     assert branch.width_at(10, options.thickness) is None
-    rod = type(branch)(**(vars(branch) | {"config": branch.config | {"law": "flat rod"}}))
+    rod = dataclasses.replace(branch, scene=branch.scene.model_copy(update={"law": "flat rod"}))
     assert not export.placed(rod, _fold(results), 1.0)[0].eta.any()
 
 

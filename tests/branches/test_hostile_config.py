@@ -6,15 +6,18 @@ import time
 import pytest
 import yaml
 
-from branches.config import Config, ConfigError, DiagramConfig, OriginConfig, dump, load, parse
-from branches.files import StoreError
-from branches.job import run_branch
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene, OriginConfig
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, load, parse
+from branches.scene.sweep import Sweep
+from branches.store.files import StoreError
 
 hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed")
 from hypothesis import example, given, settings  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
-FIELDS = [*Config.model_fields, "pairs", "strip", "origin"]
+FIELDS = [*ClosedScene.model_fields, "pairs", "strip", "origin"]
 LAWS = ["ribbon", "flat rod", "isotropic rod", "finite width"]
 DOMAINS = ["cell", "half loop", "half loop between axes"]
 WORDS = [*LAWS, *DOMAINS, "wavenumber 1 even"]
@@ -97,17 +100,17 @@ def test_what_is_accepted_runs(tmp_path_factory, silent, data):
     if values["law"] == "finite width":
         values["Gamma"] = draw(st.one_of(st.floats(0, 1e12), st.floats(0, 100)))
     config = scene_or_sentence(yaml.safe_dump(values))
-    if config is None or isinstance(config, DiagramConfig):
+    if config is None or isinstance(config, Sweep):
         return
     path = tmp_path_factory.mktemp("run") / "x.h5"
     try:
-        assert run_branch(config, path, silent()) in ("complete", "lost")
+        assert run_scene(config, path, silent()) in ("complete", "lost")
     except (ConfigError, StoreError) as error:
         assert "\n" not in str(error) and not os.listdir(path.parent)
 
 
 def test_no_field_is_left_out_here():
-    assert set(OriginConfig.model_fields) == {"kappa_n", "kappa_star", "mode"} and set(Config.model_fields) < set(FIELDS)
+    assert set(OriginConfig.model_fields) == {"kappa_n", "kappa_star", "mode"} and set(ClosedScene.model_fields) < set(FIELDS)
 
 
 @pytest.mark.parametrize(
@@ -116,5 +119,5 @@ def test_no_field_is_left_out_here():
 def test_names_of_files(tmp_path, silent, name):
     (tmp_path / name).write_text("m: 1\nn: 2\nsteps: {max_points: 2}\n")
     path = (tmp_path / name).with_suffix(".h5")
-    assert run_branch(load(tmp_path / name), path, silent()) == "complete"
+    assert run_scene(load(tmp_path / name), path, silent()) == "complete"
     assert sorted(os.listdir(tmp_path)) == sorted([name, path.name])

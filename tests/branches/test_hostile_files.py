@@ -10,11 +10,12 @@ import h5py
 import numpy as np
 import pytest
 
-from branches import diagram_graph as diagram
-from branches.config import Config
-from branches.files import StoreError
-from branches.job import run_branch
+from branches.graph import closed as diagram
+from branches.graph.stored import new_graph, read, save
 from branches.read import read_branch
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
+from branches.store.files import StoreError
 
 SCENE = {"m": 1, "n": 2, "stride": 3}
 
@@ -22,7 +23,7 @@ SCENE = {"m": 1, "n": 2, "stride": 3}
 @pytest.fixture(scope="module")
 def good(tmp_path_factory, silent):
     path = tmp_path_factory.mktemp("good") / "x.h5"
-    run_branch(Config(**SCENE, steps={"max_points": 15}), path, silent())
+    run_scene(ClosedScene(**SCENE, steps={"max_points": 15}), path, silent())
     return path
 
 
@@ -31,7 +32,7 @@ def read_all(path):
     branch = read_branch(path)
     for point in branch.kept():
         branch.shape(point)
-    graph = diagram.new_graph()
+    graph = new_graph()
     diagram.add_branch(graph, branch, path.name)
     return diagram.states_at(graph, 3.0)
 
@@ -124,7 +125,7 @@ def test_files_made_to_do_harm(good, tmp_path, silent, change):
     with h5py.File(path, "r+") as file:
         change(file)
     assert refused(lambda: read_all(path))
-    assert refused(lambda: run_branch(Config(**SCENE), path, silent(), resume=True))
+    assert refused(lambda: run_scene(ClosedScene(**SCENE), path, silent(), resume=True))
 
 
 @pytest.mark.parametrize("change", HARM_TO_RESUMING.values(), ids=HARM_TO_RESUMING.keys())
@@ -133,7 +134,7 @@ def test_states_that_no_run_was_in(good, tmp_path, silent, change):
     with h5py.File(path, "r+") as file:
         change(file)
     before = path.read_bytes()
-    assert "damaged" in refused(lambda: run_branch(Config(**SCENE), path, silent(), resume=True))
+    assert "damaged" in refused(lambda: run_scene(ClosedScene(**SCENE), path, silent(), resume=True))
     assert path.read_bytes() == before
 
 
@@ -160,20 +161,20 @@ def test_files_that_lost_their_end(good, tmp_path, silent, part):
     path, image = tmp_path / "x.h5", good.read_bytes()
     path.write_bytes(image[: int(part * len(image))])
     assert "not a readable HDF5 file" in refused(lambda: read_all(path))
-    assert "not a readable HDF5 file" in refused(lambda: run_branch(Config(**SCENE), path, silent(), resume=True))
+    assert "not a readable HDF5 file" in refused(lambda: run_scene(ClosedScene(**SCENE), path, silent(), resume=True))
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"nodes": 3}', '{"nodes": [], "edges": 1}', "\0"])
 def test_diagrams_that_are_none(tmp_path, text):
     (tmp_path / "diagram.json").write_text(text)
-    assert "not a diagram" in refused(lambda: diagram.read(tmp_path))
+    assert "not a diagram" in refused(lambda: read(tmp_path))
 
 
 def test_diagrams_with_a_value_changed(good, tmp_path):
     """Every value of every node and edge in turn, by every kind of JSON: refused, or answers."""
-    graph = diagram.new_graph()
+    graph = new_graph()
     diagram.add_branch(graph, read_branch(good), "x.h5")
-    diagram.save(graph, tmp_path)
+    save(graph, tmp_path)
     text, count = (tmp_path / "diagram.json").read_text(), 0
     whole = json.loads(text)
     places = [("graph",), *((part, number) for part in ("nodes", "edges") for number in range(len(whole[part])))]
@@ -193,7 +194,7 @@ def _at(data, place):
 
 
 def _ask(folder):
-    graph = diagram.read(folder)
+    graph = read(folder)
     diagram.families(graph), diagram.folds(graph, -8, 14), diagram.states_at(graph, 3.0)
     with contextlib.suppress(KeyError):  # there is no such branch
         diagram.course(graph, 1, 2)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from branches import interrupt
+from branches.store import interrupt
 
 PRIMARY = "{m: 3, n: 1, stability: true, limits: {kappa_n: [-120, 100]}, stride: 50}"
 STRIP = shlex.split(
@@ -16,24 +16,24 @@ STRIP = shlex.split(
 MANY = "{m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], limits: {kappa_n: [-100, 100]}, stride: 20}"
 #: The command's arguments, what its line says, and the module after whose import it computes.
 COMMANDS = {
-    "run": (["many.yaml", "--out", "many"], "finished branches are kept", "branches.job"),
-    "secondary": (["primary.h5", "--out", "all"], "finished branches are kept", "branches.stability"),
+    "run": (["many.yaml", "--out", "many"], "finished branches are kept", "branches.run.runner"),
+    "secondary": (["primary.h5", "--out", "all"], "finished branches are kept", "branches.scene.index"),
     "paper": (["--out", "page", "fig11"], "finished items are on the page", "branches.paper.page"),
     "strip": (STRIP, "this command writes no files", "ribbon_model.seeds"),
     "explore": (["primary.h5", "--out", "page.html"], "no page was written", "branches.explore.gather"),
-    "shell": (["--out", "shell.h5"], "finished cases are kept", "branches.shell"),
-    "graph": (["many.yaml"], "this command writes no files", "branches.preview"),
+    "shell": (["--out", "shell.h5"], "finished cases are kept", "branches.paper.shell_run"),
+    "graph": (["many.yaml"], "this command writes no files", "branches.graph.preview"),
 }
 
 
 @pytest.fixture(scope="module")
 def primary(tmp_path_factory):
     """The image of a branch with secondary bifurcations."""
-    from branches.config import parse
-    from branches.display import Display
-    from branches.job import compute_branch
+    from branches.run.display import Display
+    from branches.run.runner import compute_scene
+    from branches.scene.parse import parse
 
-    return compute_branch(parse(PRIMARY, "scene"), Display(silent=True)).image
+    return compute_scene(parse(PRIMARY, "scene"), Display(silent=True)).image
 
 
 def interrupted(process, module: str, delay: float) -> list[str]:
@@ -66,7 +66,7 @@ def test_ctrl_c(command, primary, name, moment):
     process = command.start(*arguments, program=("-X", "importtime", "-m", f"branches.{name}"), env=path)
     early = moment == "importing"
     fast = early or name == "explore"  # which computes for a tenth of a second
-    said = interrupted(process, "branches.interrupt" if early else module, 0.02 if fast else 0.1)
+    said = interrupted(process, "branches.store.interrupt" if early else module, 0.02 if fast else 0.1)
     assert process.returncode == 130, said
     assert len(said) == 1 and said[0].startswith("interrupted")
     if name == "explore" and (folder / "page.html").exists():  # it was fast

@@ -10,11 +10,13 @@ from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
 import contin
-from branches.config import ConfigError, parse
-from branches.display import Display
-from branches.open_errors import errors_of
-from branches.open_job import first_state, run_stages
 from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.errors import errors_of
+from branches.scene.fields import ConfigError
+from branches.scene.open_stage import first_state
+from branches.scene.parse import parse
 from ribbon_model.open_strip import REACTIONS
 
 DIMENSIONS = "{width: 0.01, thickness: 0.0005, length: 0.4, poisson_ratio: 0.3, youngs_modulus: 200.0e9}"
@@ -22,7 +24,7 @@ DIMENSIONS = "{width: 0.01, thickness: 0.0005, length: 0.4, poisson_ratio: 0.3, 
 
 def followed(text, tmp_path, settings=()):
     path = tmp_path / "scene.h5"
-    outcome = run_stages(parse(text, "scene", list(settings)), path, Display(silent=True), overwrite=True)
+    outcome = run_scene(parse(text, "scene", list(settings)), path, Display(silent=True), overwrite=True)
     return outcome, read_branch(path)
 
 
@@ -184,6 +186,6 @@ def test_a_point_without_an_error_of_its_place_has_none_of_its_forces():
 def test_the_summary_shows_the_errors(tmp_path, capsys):
     scene = f"material: {{}}\ndimensions: {DIMENSIONS}\nnumbers: {{distance: 0.39}}\nbegin: arch\n"
     text = f"{scene}stages: [{{follow: distance, to: 0.3}}]\n"
-    run_stages(parse(text, "s"), tmp_path / "s.h5", Display(quiet=True))
+    run_scene(parse(text, "s"), tmp_path / "s.h5", Display(quiet=True))
     line = next(line for line in capsys.readouterr().out.splitlines() if "distance = 0.3" in line)
     assert "energy = " in line and " J (± " in line and "F_tangent = -" in line and " N (± " in line

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from branches import run
-from branches.config import load, parse
-from branches.display import Display
-from branches.open_barriers import places, report, states_at
-from branches.open_job import run_stages
 from branches.read import read_branch
+from branches.run import __main__ as run
+from branches.run.barriers import places, report, states_at
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.parse import load, parse
 
 
 @pytest.fixture(scope="module")
 def twisted(tmp_path_factory, root):
     path = tmp_path_factory.mktemp("barriers") / "open_barriers.h5"
-    assert run_stages(load(root / "configs" / "open_barriers.yaml"), path, Display(silent=True)) == "complete"
+    assert run_scene(load(root / "configs" / "open_barriers.yaml"), path, Display(silent=True)) == "complete"
     return read_branch(path)
 
 

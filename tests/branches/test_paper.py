@@ -2,7 +2,7 @@
 
 import pytest
 
-from branches import shell
+from branches.paper import shell_run as shell
 from branches.paper.__main__ import ITEMS, main
 from branches.paper.page import Row
 from ribbon_model import exact

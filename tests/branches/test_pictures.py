@@ -8,33 +8,36 @@ import pytest
 from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
 
-from branches import draw_strip
-from branches.config import load, parse
-from branches.diagram import run_diagram
-from branches.disentangle import crossings
-from branches.display import Display
-from branches.draw_branch import curve, figure
-from branches.draw_diagram import circles, colour_of, conjugate, heights, legend, lines
-from branches.files import write_picture
-from branches.film import evenly
-from branches.job import run_branch
+from branches.draw import strip as draw_strip
+from branches.draw.picture import figure, panel
+from branches.draw.solid import widest
+from branches.draw.style import colour_of
+from branches.export.film import evenly
+from branches.graph.disentangle import crossings
+from branches.graph.picture import circles, conjugate, heights, legend, lines
+from branches.graph.preview import preview
 from branches.paper.diagram import FIG12, WINDOW
-from branches.preview import preview
 from branches.read import read_branch
-from branches.solid import widest
+from branches.run.display import Display
+from branches.run.many import run_many
+from branches.run.runner import run_scene
+from branches.scene.parse import load, parse
+from branches.store.files import write_picture
 
 
 def branch_of(folder, scene):
     """The branch of a scene, given as text or read already."""
     config = parse(scene, "scene") if isinstance(scene, str) else scene
-    run_branch(config, folder / "x.h5", Display(silent=True), overwrite=True)
+    run_scene(config, folder / "x.h5", Display(silent=True), overwrite=True)
     return read_branch(folder / "x.h5")
 
 
 def drawn(folder, scene):
     """The axes of a branch, without strips."""
     axes = Figure().subplots()
-    curve(axes, branch_of(folder, scene), [])
+    branch = branch_of(folder, scene)
+    panel(axes, branch, branch.panels[0], [])
+    axes.set_title(branch.caption)
     return axes
 
 
@@ -57,7 +60,7 @@ def test_a_limit_is_said_to_be_the_scenes(tmp_path):
 
 def test_the_script_says_which_family_it_draws(tmp_path, call, root):
     scene = parse("{m: 1, n: 2, nu: [0.3, 0.31], limits: {kappa_n: [0, 20]}, stride: 50}", "scene")
-    run_diagram(scene, tmp_path / "two", Display(silent=True))
+    run_many(scene, tmp_path / "two", Display(silent=True))
     main = runpy.run_path(str(root / "scripts" / "plot_diagram.py"))["main"]
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
     assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
@@ -123,28 +126,29 @@ def test_a_strip_with_dimensions_is_drawn_in_si_units_and_at_its_width(tmp_path,
     scene = load(root / "configs" / "strip_bandsaw.yaml")
     branch = branch_of(tmp_path, scene)
     axes = Figure().subplots()
-    curve(axes, branch, [])
+    panel(axes, branch, branch.panels[0], [])
+    axes.set_title(branch.caption)
     assert axes.get_xlabel().endswith("in 1/m") and "5.65 × 0.65 × 3000 mm" in axes.get_title()
     assert axes.lines[0].get_xdata()[0] == pytest.approx(branch.points["kappa_n"][0] * 2 * math.pi / 3.0)
     assert "natural curvature of the strip" in [text.get_text() for text in axes.get_legend().get_texts()]
-    strips = [draw_strip.strip_of(branch, point) for point in branch.kept()[:2]]
-    assert draw_strip.width_of(branch.config, strips) == pytest.approx(2 * math.pi * 0.00565 / 3.0)
+    strips = [branch.placed(point, 2 * math.pi)[0] for point in branch.kept()[:2]]
+    assert branch.drawn_width(strips, None) == pytest.approx(2 * math.pi * 0.00565 / 3.0)
 
 
 def test_generators_never_cross_in_a_picture(tmp_path):
     branch = branch_of(tmp_path, "{m: 1, n: 3}")  # bends sharply: at the usual width its generators cross
-    strips = [draw_strip.strip_of(branch, point) for point in branch.kept()]
+    strips = [branch.placed(point, 2 * math.pi)[0] for point in branch.kept()]
     least = min(map(widest, strips))
     assert draw_strip.ROOM * least < draw_strip.WIDTH
-    assert draw_strip.width_of(branch.config, strips, 0.3) == pytest.approx(draw_strip.ROOM * least)
+    assert branch.drawn_width(strips, 0.3) == pytest.approx(draw_strip.ROOM * least)
     rod = branch_of(tmp_path, "{law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
-    shapes = [draw_strip.strip_of(rod, point) for point in rod.kept()]
+    shapes = [rod.placed(point, 2 * math.pi)[0] for point in rod.kept()]
     assert not any(shape.eta.any() for shape in shapes)  # a rod has no generators
-    assert draw_strip.width_of(rod.config, shapes) == draw_strip.WIDTH
+    assert rod.drawn_width(shapes, None) == draw_strip.WIDTH
 
 
 def test_the_picture_of_a_circle_has_no_seams_and_its_near_side_in_front(tmp_path):
-    circle = draw_strip.strip_of(branch_of(tmp_path, "{m: 1, n: 2, limits: {kappa_n: [0, 20]}}"), 0)
+    circle = branch_of(tmp_path, "{m: 1, n: 2, limits: {kappa_n: [0, 20]}}").placed(0, 2 * math.pi)[0]
     picture = draw_strip.rendered(circle, 0.3, 1.05, 120)
     alpha = picture[..., 3]
     beside = np.min([alpha[1:-1, :-2], alpha[1:-1, 2:], alpha[:-2, 1:-1], alpha[2:, 1:-1]], axis=0)
@@ -160,7 +164,7 @@ def test_the_picture_of_a_circle_has_no_seams_and_its_near_side_in_front(tmp_pat
 
 def test_frames_of_a_film_are_as_far_apart_as_the_points_allow(tmp_path):
     branch = branch_of(tmp_path, "{m: 1, n: 2, steps: {largest: 0.05}}")
-    strips = draw_strip.steady({point: draw_strip.strip_of(branch, point) for point in branch.kept().tolist()})
+    strips = draw_strip.steady({point: branch.placed(point, 2 * math.pi)[0] for point in branch.kept().tolist()})
     places = [draw_strip.places(strips[point]) for point in evenly(strips, 12)]
     moved = np.array([np.sqrt(np.mean(np.sum((b - a) ** 2, axis=1))) for a, b in zip(places, places[1:])])
     assert len(moved) == 11 and np.ptp(moved) < 0.25 * moved.mean()

@@ -5,14 +5,16 @@ import time
 
 import pytest
 
-from branches import progress as module
-from branches import shell
-from branches.config import parse
-from branches.diagram import _Plan
-from branches.diagram_graph import _circle, new_graph
-from branches.display import Display
-from branches.executor import WAIT
-from branches.progress import Progress, StartingDisplay
+from branches.graph.closed import _circle
+from branches.graph.kinds import graph_kind
+from branches.graph.stored import new_graph
+from branches.paper import shell_run as shell
+from branches.run import progress as module
+from branches.run.display import Display
+from branches.run.executor import WAIT
+from branches.run.many import _Plan
+from branches.run.progress import Progress, StartingDisplay
+from branches.scene.parse import parse
 from contin.lowlevel import exact_text
 
 TAPE = "--width .016 --thickness .00012 --length .6 --natural-radius .03 --poisson-ratio .3 --youngs-modulus 200e9"
@@ -118,20 +120,22 @@ def test_the_estimate_of_many_branches_is_steady(monkeypatch, capsys):
     nus = [k / 100 for k in range(20)]
     fields = "law: [ribbon, flat rod, finite width], Gamma: 1, m: [1, 3, 5], n: [1, 2, 3, 4], limits: {kappa_n: [-1e6, 1e6]}"
     config, graph = parse(f"{{nu: {nus}, {fields}}}", "scene"), new_graph()
-    plan, busy, totals = _Plan(config.branches, list(config.branches), graph), [], []
-    display.begin_diagram(config, len(config.branches), 0)
-    for done in range(1, len(config.branches) + 1):
+    plan, busy, totals = _Plan(config, list(config.scenes), lambda scene: graph_kind(scene).holds(graph, scene)), [], []
+    display.begin_many("diagram", len(config.scenes), 0)
+    for done in range(1, len(config.scenes) + 1):
         while len(busy) < 2 and (one := plan.next([job for _, job in busy])) not in (None, WAIT):
-            busy.append((now[0] + one.m * one.n * (2 if one.Gamma else 1), one))
+            scene = config.scenes[one[0]]
+            busy.append((now[0] + scene.m * scene.n * (2 if scene.Gamma else 1), one))
         if not busy:
             break
         now[0], one = min(busy, key=lambda job: job[0])
         busy.remove((now[0], one))
+        one = config.scenes[one[0]]
         graph.add_node(_circle({"law": one.material, "nu": one.nu, "n": one.n}, 2 * one.n - one.m))
-        display.branch_done(one, "", [], done + len(plan.left_out))
-        if done + len(plan.left_out) > len(config.branches) / 20:
+        display.branch_done([], "", done + len(plan.left_out))
+        if done + len(plan.left_out) > len(config.scenes) / 20:
             totals.append(now[0] + _seconds(said[-1]))
-    assert (len(config.branches), len(plan.left_out)) == (600, 180)
+    assert (len(config.scenes), len(plan.left_out)) == (600, 180)
     assert _seconds(said[-1]) == 0
     assert 0.9 * now[0] < min(totals) <= max(totals) < 1.1 * now[0]
 

@@ -12,11 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from branches.config import Config, ConfigError, load
-from branches.display import Display
-from branches.files import StoreError
-from branches.job import run_branch
-from branches.run import main
+from branches.run.__main__ import main
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import load
+from branches.store.files import StoreError
 from ribbon_model import exact
 
 #: A run of a second or two, so that there is time to interrupt it.
@@ -25,7 +27,7 @@ LONG_SETTINGS = ("--set", "steps.largest=0.008", "--set", "steps.max_points=1000
 
 
 def scene_of(**fields):
-    return Config(**{"m": 1, "n": 2, "zeros": {"kappa_n": [3.0, 1.0]}, "stride": 3, **fields})
+    return ClosedScene(**{"m": 1, "n": 2, "zeros": {"kappa_n": [3.0, 1.0]}, "stride": 3, **fields})
 
 
 @pytest.fixture
@@ -44,7 +46,7 @@ def undisturbed(tmp_path_factory, silent, tables):
         key = repr(config)
         if key not in known:
             path = folder / f"{len(known)}.h5"
-            run_branch(config, path, silent())
+            run_scene(config, path, silent())
             known[key] = tables(path)
         return known[key]
 
@@ -58,7 +60,7 @@ def rows(path):
 
 def test_zeros_that_agree_in_six_digits_have_names_of_their_own(tmp_path, capsys):
     path, values = tmp_path / "x.h5", [3.0, 3.0000001, 3.00000014]
-    run_branch(scene_of(zeros={"kappa_n": values}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
+    run_scene(scene_of(zeros={"kappa_n": values}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
     with h5py.File(path) as file:
         events = file["events"][:]
     zeros = events[events["label"] == b"UZ"]
@@ -103,12 +105,12 @@ def test_every_scene_against_the_exact_solution(tmp_path, root, silent):
     scenes = {
         name: scene
         for name, scene in scenes.items()
-        if isinstance(scene, Config) and scene.law == "ribbon" and not scene.stability
+        if isinstance(scene, ClosedScene) and scene.law == "ribbon" and not scene.stability
     }
     assert len(scenes) >= 6
     for name, config in scenes.items():
         path, mode = tmp_path / f"{name}.h5", (config.m, config.n, config.nu)
-        assert run_branch(config, path, silent()) == "complete"
+        assert run_scene(config, path, silent()) == "complete"
         with h5py.File(path) as file:
             events = file["events"][:]
         limits = config.limits["kappa_n"]
@@ -178,7 +180,7 @@ def test_a_mistake_gets_one_sentence_and_changes_nothing(scene, arguments, said,
     monkeypatch.chdir(folder)
     (folder / "results" / "scene.h5").mkdir(parents=True)
     (folder / "foreign.h5").write_bytes(b"precious\n")
-    run_branch(Config(m=1, n=3, steps={"max_points": 2}), folder / "other.h5", silent())
+    run_scene(ClosedScene(m=1, n=3, steps={"max_points": 2}), folder / "other.h5", silent())
     before = {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
     assert main([*arguments, "--quiet"]) == 2
     printed = capsys.readouterr()
@@ -197,12 +199,12 @@ def test_a_mistake_in_the_command_line_itself(arguments, capsys):
 def test_an_unfinished_result_is_not_replaced_unasked(tmp_path, silent, undisturbed, tables):
     path, config = tmp_path / "x.h5", scene_of()
     stop = silent({9: lambda: signal.raise_signal(signal.SIGINT)})
-    assert run_branch(config, path, stop) == "interrupted"
+    assert run_scene(config, path, stop) == "interrupted"
     with pytest.raises(StoreError, match="unfinished run of this scene; --resume continues it"):
-        run_branch(config, path, silent())
-    assert run_branch(config, path, silent(), overwrite=True) == "complete"
+        run_scene(config, path, silent())
+    assert run_scene(config, path, silent(), overwrite=True) == "complete"
     assert tables(path) == undisturbed(config)
-    assert run_branch(config, path, silent()) == "complete"  # a finished one of the same scene may be computed again
+    assert run_scene(config, path, silent()) == "complete"  # a finished one of the same scene may be computed again
 
 
 @pytest.fixture
@@ -257,7 +259,7 @@ def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tabl
     while outcome != "complete":
         number = len(rows(path)) if path.exists() else 0
         display = silent({number: lambda: signal.raise_signal(signal.SIGINT)})
-        outcome = run_branch(config, path, display, resume=path.exists())
+        outcome = run_scene(config, path, display, resume=path.exists())
         stops += outcome == "interrupted"
         assert os.listdir(tmp_path) == ["x.h5"]
     assert tables(path) == undisturbed(config)
@@ -267,9 +269,9 @@ def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tabl
 @pytest.mark.parametrize("number", [0, 7, 18])
 def test_sigterm_does_the_same(tmp_path, silent, undisturbed, tables, number):
     path, config = tmp_path / "x.h5", scene_of()
-    assert run_branch(config, path, silent({number: lambda: signal.raise_signal(signal.SIGTERM)})) == "interrupted"
+    assert run_scene(config, path, silent({number: lambda: signal.raise_signal(signal.SIGTERM)})) == "interrupted"
     assert len(rows(path)) > number
-    assert run_branch(config, path, silent(), resume=True) == "complete"
+    assert run_scene(config, path, silent(), resume=True) == "complete"
     assert tables(path) == undisturbed(config)
 
 
@@ -288,7 +290,7 @@ def test_the_number_of_threads_makes_no_difference(command, scene, tables):
 
 def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
     path = tmp_path / "x.h5"
-    run_branch(scene_of(), path, silent())
+    run_scene(scene_of(), path, silent())
     before = path.read_bytes()
 
     def twice():
@@ -298,7 +300,7 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
         time.sleep(0.01)
 
     with pytest.raises(KeyboardInterrupt):
-        run_branch(scene_of(), path, silent({5: twice}))
+        run_scene(scene_of(), path, silent({5: twice}))
     assert path.read_bytes() == before and os.listdir(tmp_path) == ["x.h5"]
 
 
@@ -310,7 +312,7 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
     The slowest test of the folder: six processes, each of which loads the compiled kernels and computes for a while.
     tests/test_torture.py has each fault once.
     """
-    config = Config(m=1, n=2, **LONG)
+    config = ClosedScene(m=1, n=2, **LONG)
     whole = undisturbed(config)["points"]
     path, chance = command.folder / "x.h5", random.Random(4)
     arguments = (scene, "--out", path, "--quiet", *LONG_SETTINGS)
@@ -349,7 +351,7 @@ def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undistur
     assert (second.returncode, second.out) == (2, "")
     assert second.err.startswith(f"error: another run (process {first.pid} on ") and second.err.count("\n") == 1
     assert first.communicate()[1] == "" and first.returncode == 0
-    assert tables(path) == undisturbed(Config(m=1, n=2, **LONG))
+    assert tables(path) == undisturbed(ClosedScene(m=1, n=2, **LONG))
     assert sorted(os.listdir(command.folder)) == ["scene.yaml", "x.h5"]
 
 
@@ -367,16 +369,16 @@ def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
 
 def test_resuming_a_complete_run_does_nothing(tmp_path, silent):
     path, display = tmp_path / "x.h5", silent()
-    run_branch(scene_of(), path, silent())
+    run_scene(scene_of(), path, silent())
     before = path.read_bytes()
-    assert run_branch(scene_of(), path, display, resume=True) == "complete"
+    assert run_scene(scene_of(), path, display, resume=True) == "complete"
     assert display.notes == [f"{path} is complete already (returned to the trivial branch (M2 = 0)); nothing to do"]
     assert path.read_bytes() == before
 
 
 def test_resuming_without_a_file_starts_and_says_so(tmp_path, silent):
     path, display = tmp_path / "none" / "x.h5", silent()
-    assert run_branch(scene_of(), path, display, resume=True) == "complete"
+    assert run_scene(scene_of(), path, display, resume=True) == "complete"
     assert display.notes == [f"--resume: there is no file {str(path)!r}; the run starts from the beginning"]
     assert path.exists()
 
@@ -407,9 +409,9 @@ EXTENSIONS = {
 @pytest.mark.parametrize("first, then", EXTENSIONS.values(), ids=EXTENSIONS.keys())
 def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, tables, first, then):
     path = tmp_path / "x.h5"
-    assert run_branch(scene_of(**first), path, silent()) == "complete"
+    assert run_scene(scene_of(**first), path, silent()) == "complete"
     fewer = len(rows(path))
-    assert run_branch(scene_of(**then), path, silent(), resume=True) == "complete"
+    assert run_scene(scene_of(**then), path, silent(), resume=True) == "complete"
     assert tables(path) == undisturbed(scene_of(**then))
     assert len(rows(path)) > fewer
     with h5py.File(path) as file:  # the scene in the file is that of the last run
@@ -424,10 +426,10 @@ def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, t
 ])  # fmt: skip
 def test_a_run_that_cannot_be_extended_so(tmp_path, silent, first, then, said):
     path = tmp_path / "x.h5"
-    run_branch(scene_of(**first), path, silent())
+    run_scene(scene_of(**first), path, silent())
     before = path.read_bytes()
     with pytest.raises((StoreError, ConfigError), match=said):
-        run_branch(scene_of(**then), path, silent(), resume=True)
+        run_scene(scene_of(**then), path, silent(), resume=True)
     assert path.read_bytes() == before
 
 
@@ -461,12 +463,12 @@ def test_an_encoding_without_the_letters(command, scene):
 @pytest.mark.parametrize("columns", [1, 12, 80])
 def test_the_moving_line_fits_the_terminal(columns, tmp_path, silent, monkeypatch, capsys):
     """Drawn on whatever standard error is, and told that this is a terminal of so many columns."""
-    from branches.display import Display
+    from branches.run.display import Display
 
     monkeypatch.setenv("COLUMNS", str(columns))
     display = Display()
     display._moving, display._shown = True, -1e9
-    run_branch(scene_of(steps={"max_points": 4}), tmp_path / "x.h5", display)
+    run_scene(scene_of(steps={"max_points": 4}), tmp_path / "x.h5", display)
     drawn = capsys.readouterr().err.split("\r")
     assert max(map(len, drawn)) <= max(columns - 1, 0)
     assert columns < 80 or any("step" in line and "error" in line and "points/s" in line for line in drawn)

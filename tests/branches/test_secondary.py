@@ -6,12 +6,14 @@ import json
 import numpy as np
 import pytest
 
-from branches import diagram_graph as diagram
-from branches.config import Config, ConfigError, dump, parse
-from branches.display import Display
-from branches.job import run_branch
-from branches.names import secondary_file
+from branches.graph import closed as diagram
+from branches.graph.stored import new_graph, read
 from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, parse
 from branches.secondary import main
 
 PAIR = "{m: 5, n: 2, stability: true, limits: {kappa_n: [-21, 100]}, stride: 20}"
@@ -23,7 +25,7 @@ SCENE = f"{{m: 3, n: 1, domain: half loop, {ORIGIN}, limits: {{kappa_n: [-200, 1
 def returned(tmp_path_factory):
     """The branch that leaves (3, 1), without its index."""
     path = tmp_path_factory.mktemp("secondary") / "x.h5"
-    assert run_branch(parse(SCENE, "scene"), path, Display(silent=True)) == "complete"
+    assert run_scene(parse(SCENE, "scene"), path, Display(silent=True)) == "complete"
     return read_branch(path)
 
 
@@ -37,11 +39,11 @@ def test_the_branch_of_m3_n1_returns_to_it(returned):
 
 
 def test_a_branch_is_put_between_the_bifurcations_that_it_joins(returned, tmp_path):
-    run_branch(
+    run_scene(
         parse("{m: 3, n: 1, stability: true, limits: {kappa_n: [-120, 100]}, stride: 50}", "scene"), tmp_path / "p.h5",
         Display(silent=True),
     )  # fmt: skip
-    graph = diagram.new_graph()
+    graph = new_graph()
     diagram.add_branch(graph, read_branch(tmp_path / "p.h5"), "p.h5")
     count = graph.number_of_nodes()
     assert diagram.add_branch(graph, returned, "x.h5") and graph.number_of_nodes() == count
@@ -57,11 +59,11 @@ def test_a_branch_is_put_between_the_bifurcations_that_it_joins(returned, tmp_pa
 
 @pytest.mark.full
 def test_the_command_follows_both_kinds_of_a_pair_and_says_so(command, tmp_path):
-    run_branch(parse(PAIR, "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse(PAIR, "scene"), tmp_path / "x.h5", Display(silent=True))
     done = command("x.h5", "--out", "all", program=("-m", "branches.secondary"))
     assert done.returncode == 0, done.err
     assert done.out.count("kernel of dimension 2") == 2 and "keeps one two-fold axis" in done.out
-    graph = diagram.read(tmp_path / "all")
+    graph = read(tmp_path / "all")
     switches = json.loads(graph.graph["switches"])
     assert [(one["domain"], one["outcome"]) for one in switches] == [
         ("half loop", "followed"),
@@ -75,13 +77,13 @@ def test_the_command_follows_both_kinds_of_a_pair_and_says_so(command, tmp_path)
         assert first["index"] == index and first["energy"][0] == pytest.approx(start["energy"], abs=1e-5)
     assert (tmp_path / "all" / mirror["file"]).exists()
     assert main([str(tmp_path / "x.h5"), "--out", str(tmp_path / "all"), "--quiet"]) == 0  # takes what is there
-    assert len(diagram.secondaries(diagram.read(tmp_path / "all"))) == 2
+    assert len(diagram.secondaries(read(tmp_path / "all"))) == 2
 
 
 def test_places_that_agree_in_six_digits_have_files_of_their_own():
     config, taken = parse(SCENE, "scene"), set()
     for place in ("-21.6268", "-21.62681748", "-21.62681748_2.78375737"):
-        name = secondary_file(config, taken)
+        name = config.secondary_file(taken)
         assert name == f"ribbon_nu0.3_m3_n1_from{place}_half_loop.h5"
         taken.add(name)
 
@@ -91,9 +93,10 @@ def test_places_that_agree_in_nine_digits_have_nodes_of_their_own(returned):
     points, events = returned.points.copy(), returned.events.copy()
     for table in (points, events):
         table["kappa_star"] += 0.5
-    origin = returned.config["origin"] | {"kappa_star": returned.config["origin"]["kappa_star"] + 0.5}
-    other = dataclasses.replace(returned, points=points, events=events, config=returned.config | {"origin": origin})
-    graph = diagram.new_graph()
+    origin = returned.scene.origin.model_copy(update={"kappa_star": returned.scene.origin.kappa_star + 0.5})
+    scene = returned.scene.model_copy(update={"origin": origin})
+    other = dataclasses.replace(returned, points=points, events=events, scene=scene)
+    graph = new_graph()
     assert diagram.add_branch(graph, returned, "a.h5")
     first = set(graph)
     assert diagram.add_branch(graph, other, "b.h5") and not diagram.add_branch(graph, other, "again.h5")
@@ -104,7 +107,7 @@ def test_places_that_agree_in_nine_digits_have_nodes_of_their_own(returned):
 
 
 def test_a_file_holds_its_scene(returned):
-    text = dump(Config.model_validate(returned.config))
+    text = dump(ClosedScene.model_validate(returned.config))
     assert parse(text, "again") == parse(SCENE, "scene")
 
 
@@ -125,11 +128,11 @@ def test_origins_that_are_none(change, message):
 
 def test_an_origin_beside_the_branch_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="is not on the branch"):
-        run_branch(parse(SCENE, "scene", ["origin.kappa_star=2.5"]), tmp_path / "x.h5", Display(silent=True))
+        run_scene(parse(SCENE, "scene", ["origin.kappa_star=2.5"]), tmp_path / "x.h5", Display(silent=True))
 
 
 def test_results_that_the_command_cannot_use(capsys, tmp_path):
-    run_branch(parse("{m: 1, n: 2, stride: 50}", "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse("{m: 1, n: 2, stride: 50}", "scene"), tmp_path / "x.h5", Display(silent=True))
     for name, words in (("x.h5", "stability: true"), ("absent.h5", "no such file")):
         assert main([str(tmp_path / name)]) == 2
         said = capsys.readouterr().err

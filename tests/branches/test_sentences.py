@@ -3,12 +3,12 @@
 import pytest
 
 import contin
-from branches import advice
-from branches.config import ConfigError, parse
-from branches.display import Display
-from branches.job import run_branch
-from branches.open_job import run_stages
 from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene import advice
+from branches.scene.fields import ConfigError
+from branches.scene.parse import parse
 
 DIMENSIONS = "{width: 0.01, thickness: 0.0005, length: 0.4, poisson_ratio: 0.3, youngs_modulus: 200.0e9}"
 ARCH = "material: {law: flat rod, nu: 0.3}\nnumbers: {distance: 0.95}\nbegin: arch\n"
@@ -18,7 +18,7 @@ FOREIGN = ("abs", "max,", "Newton(", "MeshControl", "min_step", "newton=", "scal
 
 def followed(text, tmp_path, settings=()):
     path = tmp_path / "scene.h5"
-    outcome = run_stages(parse(text, "scene", list(settings)), path, Display(silent=True), overwrite=True)
+    outcome = run_scene(parse(text, "scene", list(settings)), path, Display(silent=True), overwrite=True)
     return outcome, read_branch(path)
 
 
@@ -30,13 +30,13 @@ def assert_scene_words(text):
 def test_an_advice_names_a_field_of_the_scene_and_the_run_goes_on_with_it(m, n, tmp_path):
     """Branches cannot be followed with steps of 1; the advised field is set here as the scene's user would."""
     scene = f"{{m: {m}, n: {n}, steps: {{smallest: 1, largest: 9, first: 5}}}}"
-    outcome = run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
+    outcome = run_scene(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
     branch = read_branch(tmp_path / "x.h5")
     assert outcome == "lost" and branch.stop.startswith("no state was found beyond kappa_n = ")
     assert_scene_words(branch.stop)
     key, value = branch.stop.partition("; the run goes on with ")[2].split(": ")
     changed = parse(scene, "scene", [f"{key}={value}", "steps.max_points=30"])
-    run_branch(changed, tmp_path / "y.h5", Display(silent=True))
+    run_scene(changed, tmp_path / "y.h5", Display(silent=True))
     assert len(read_branch(tmp_path / "y.h5").points) > len(branch.points) + 10
 
 
@@ -44,7 +44,7 @@ def test_a_failed_stage_of_a_law_with_an_end_is_told_so(tmp_path):
     """A ribbon whose thickness falls: the least margin lies inside, and the engine speaks of abs and max."""
     scene = 'material: {law: ribbon, nu: 0.3, kappa_n: 1}\nalong: {thickness: "1 - s/2"}\nfinish: free\n'
     outcome, branch = followed(f"{scene}stages: [{{follow: force_normal, to: 5}}]\n", tmp_path)
-    assert outcome == "lost" and "the end of the law 'ribbon', which has no value where" in branch.stop
+    assert outcome == "complete" and "stage 1: the end of the law 'ribbon', which has no value where" in branch.stop
     assert_scene_words(branch.stop)
     assert all(len(event["name"]) < 64 for event in branch.events)  # names were cut in the middle of a word
 
@@ -110,7 +110,7 @@ def test_a_state_that_is_not_found_again_is_told_in_a_sentence(tmp_path, monkeyp
     def fails(*_):
         raise contin.ConvergenceError("Newton did not converge (updates 1e+00, 2e+00)")
 
-    monkeypatch.setattr("branches.open_job._begun", fails)
+    monkeypatch.setattr("branches.scene.open_stage.OpenStage._begun", fails)
     with pytest.raises(ConfigError, match="follow: 'turn': the state at the start of the stage was not found again") as caught:
         followed(f"{ARCH}stages: [{{follow: turn, to: 1}}]\n", tmp_path)
     assert "updates" not in str(caught.value)

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from branches import shell
-from branches.files import StoreError
+from branches.paper import shell_run as shell
 from branches.paper.shell import fig7
-from branches.shell import Case, Unusable, compute, first_root, grid, read, run_ccx, solve
-from branches.shell_deck import RADIUS, Strip, direct_deck, states, thermal_deck
+from branches.paper.shell_deck import RADIUS, Strip, direct_deck, states, thermal_deck
+from branches.paper.shell_run import Case, Unusable, compute, first_root, grid, read, run_ccx, solve
+from branches.store.files import StoreError
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.unfolding import first_root as law_root
 

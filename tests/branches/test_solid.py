@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from branches import export
-from branches.config import parse
-from branches.display import Display
-from branches.open_job import run_stages
+from branches.draw.solid import Mesh, solid, surface, thickest, widest
+from branches.export import __main__ as export
 from branches.read import read_branch
-from branches.solid import Mesh, solid, surface, thickest, widest
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.parse import parse
 from ribbon_model.natural_state import states_at
 from ribbon_model.section import section_of
 from ribbon_model.shape import Shape, frames, shape_of
@@ -180,7 +180,7 @@ def result(tmp_path_factory):
         if name not in known:
             known[name] = folder / f"{name}.h5"
             scene = parse(SCENES[name], name)
-            run_stages(scene, known[name], Display(silent=True))
+            run_scene(scene, known[name], Display(silent=True))
         return known[name]
 
     return result
@@ -219,5 +219,5 @@ def test_the_shape_of_a_scene_knows_its_width_along_the_strip(result):
 
 def test_Gamma_and_a_thickness_give_the_width_of_an_open_strip(result, tmp_path):
     scene = "material: {law: finite width, nu: 0.3, Gamma: 4.0}\nfinish: free\nstages: [{follow: force_tangent, to: 1}]\n"
-    run_stages(parse(scene, "s"), tmp_path / "s.h5", Display(silent=True))
+    run_scene(parse(scene, "s"), tmp_path / "s.h5", Display(silent=True))
     assert read_branch(tmp_path / "s.h5").width_at(10, 0.02) == pytest.approx(math.sqrt(4 * 0.02 * 10))

@@ -2,12 +2,13 @@
 
 import pytest
 
-from branches import diagram_graph as diagram
-from branches.config import parse
-from branches.display import Display
-from branches.job import run_branch
+from branches.graph import closed as diagram
+from branches.graph.stored import new_graph
 from branches.read import read_branch
-from branches.stability import LABEL, Watch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.index import LABEL, SymmetryWatch
+from branches.scene.parse import parse
 from contin import Settings, trace
 from contin.lowlevel import locate_branch_point, point_of
 from ribbon_model.domains import HALF_LOOPS
@@ -22,7 +23,7 @@ SCENE = "{m: 3, n: 1, stability: true, limits: {kappa_n: [-30, 0]}, stride: 50}"
 @pytest.fixture(scope="module")
 def branch(tmp_path_factory):
     path = tmp_path_factory.mktemp("stability") / "x.h5"
-    run_branch(parse(SCENE, "scene"), path, Display(silent=True))
+    run_scene(parse(SCENE, "scene"), path, Display(silent=True))
     return read_branch(path)
 
 
@@ -40,7 +41,7 @@ def test_a_secondary_bifurcation_is_located_and_changes_the_index_by_one(branch)
 
 
 def test_pieces_of_the_diagram_carry_the_index(branch):
-    graph = diagram.new_graph()
+    graph = new_graph()
     diagram.add_branch(graph, branch, "x.h5")
     assert [data["index"] for _, _, data in graph.edges(data=True)] == [2, 1]
     (secondary,) = [data for _, data in graph.nodes(data=True) if data["kind"] == "secondary bifurcation"]
@@ -49,7 +50,7 @@ def test_pieces_of_the_diagram_carry_the_index(branch):
 
 def test_the_same_points_without_and_no_column(branch, tmp_path):
     """Another step would move all later points by a part of a step; round-off in the lengths moves them by 5e-12."""
-    run_branch(parse(SCENE.replace("stability: true, ", ""), "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse(SCENE.replace("stability: true, ", ""), "scene"), tmp_path / "x.h5", Display(silent=True))
     plain = read_branch(tmp_path / "x.h5")
     assert "index" not in plain.points.dtype.names
     regular = branch.points[branch.points["label"] != b"SB"]
@@ -58,7 +59,7 @@ def test_the_same_points_without_and_no_column(branch, tmp_path):
 
 def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
     """Index 0 up to the fold of (1, 2), 1 after it (Fig. 12 of the paper has it as a guess)."""
-    run_branch(parse("{m: 1, n: 2, stability: true, stride: 50}", "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse("{m: 1, n: 2, stability: true, stride: 50}", "scene"), tmp_path / "x.h5", Display(silent=True))
     found = read_branch(tmp_path / "x.h5")
     assert list(found.events["label"]) == [b"BP", b"LP", b"EP"]
     (fold,) = found.events["point"][found.events["label"] == b"LP"]
@@ -70,7 +71,7 @@ def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
 
 @pytest.mark.full
 def test_a_pair_of_modes_changes_the_index_by_two(tmp_path):
-    run_branch(
+    run_scene(
         parse("{m: 5, n: 2, stability: true, limits: {kappa_n: [-30, 0]}}", "scene"), tmp_path / "x.h5", Display(silent=True)
     )
     (event,) = [event for event in read_branch(tmp_path / "x.h5").events if event["label"] == b"SB"]
@@ -83,9 +84,9 @@ def test_a_pair_of_modes_changes_the_index_by_two(tmp_path):
 @pytest.mark.full
 def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
     whole, stopped = tmp_path / "whole.h5", tmp_path / "stopped.h5"
-    run_branch(parse(SCENE, "scene"), whole, silent())
-    run_branch(parse(SCENE.replace("stability", "steps: {max_points: 20}, stability"), "scene"), stopped, silent())
-    run_branch(parse(SCENE, "scene", ["steps.max_points=2000"]), stopped, silent(), resume=True)
+    run_scene(parse(SCENE, "scene"), whole, silent())
+    run_scene(parse(SCENE.replace("stability", "steps: {max_points: 20}, stability"), "scene"), stopped, silent())
+    run_scene(parse(SCENE, "scene", ["steps.max_points=2000"]), stopped, silent(), resume=True)
     assert tables(whole) == tables(stopped)
 
 
@@ -93,7 +94,7 @@ def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
 def test_the_index_ends_with_the_law(silent, tmp_path):
     """Beyond the end of its convex energy a strip of finite width has no index; the run ends there, as without the index."""
     scene = "{m: 3, n: 1, law: finite width, Gamma: 10, stability: true, limits: {kappa_n: [-60, 100]}, stride: 50}"
-    assert run_branch(parse(scene, "scene"), tmp_path / "x.h5", silent()) == "complete"
+    assert run_scene(parse(scene, "scene"), tmp_path / "x.h5", silent()) == "complete"
     branch = read_branch(tmp_path / "x.h5")
     assert branch.events[-1]["name"] == b"the end of the convex strain energy"
     assert branch.events[-1]["index"] in (-1, branch.points["index"][-2])  # right at the end there may be one
@@ -119,7 +120,7 @@ def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
     if (m, n, nu) not in QUICK and not request.config.getoption("--full"):
         pytest.skip("with --full only")
     system, x, tangent = primary_branch(RIBBON, m, n, nu, 10, 7)
-    settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, events=Watch(RIBBON, system, x).monitors)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, events=SymmetryWatch(RIBBON, system, x).monitors)
     found = trace(point_of(system, x), settings, tangent=tangent).labelled(LABEL)
     assert len(found) == AGREEMENT[m, n, nu]
     for point in found:
@@ -138,7 +139,7 @@ def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
 def test_a_pair_of_bifurcations_in_one_step(tmp_path):
     """(5, 1) at nu = .302 loses its symmetry under the mirror, and twice under the axes, between two neighbouring points."""
     scene = "{m: 5, n: 1, nu: 0.302, stability: true, limits: {kappa_n: [-40, 0]}}"
-    run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
     events = [event for event in read_branch(tmp_path / "x.h5").events if event["label"] == b"SB"]
     places = [event["kappa_n"] for event in events]
     assert places == pytest.approx([-24.058306547949, -25.6395938179, -28.4919621576], abs=1e-9)
@@ -149,7 +150,7 @@ def test_a_pair_of_bifurcations_in_one_step(tmp_path):
 def test_a_mesh_too_coarse_for_the_index_is_halved(tmp_path):
     """A strip of finite width beyond kappa_n = 14: on the mesh of the run an eigenvalue of 1e-3 has the error 1e-2."""
     scene = "{m: 3, n: 1, law: finite width, Gamma: 3, stability: true, limits: {kappa_n: [-5, 20]}}"
-    run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
+    run_scene(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
     branch = read_branch(tmp_path / "x.h5")
     (event,) = branch.events[branch.events["label"] == b"SB"]
     assert event["kappa_n"] == pytest.approx(2.5185316810, abs=1e-8) and event["error_kappa_n"] < 1e-11

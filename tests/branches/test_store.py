@@ -14,12 +14,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from branches import files
-from branches.config import Config
-from branches.files import StoreError, prepare, write_bytes
-from branches.job import run_branch
 from branches.read import read_branch
-from branches.store import open_branch
+from branches.run.runner import run_scene
+from branches.scene.closed import ClosedScene
+from branches.store import files
+from branches.store.files import StoreError, prepare, write_bytes
+from branches.store.writer import open_branch
 from ribbon_model.segments import discretized
 
 
@@ -27,9 +27,9 @@ from ribbon_model.segments import discretized
 def results(tmp_path_factory, silent):
     """The branch (1, 2) of the cell, and a piece of it on the half loop with every fifth solution kept."""
     folder = tmp_path_factory.mktemp("results")
-    assert run_branch(Config(m=1, n=2, title="é"), folder / "m1_n2.h5", silent()) == "complete"
-    half = Config(m=1, n=2, domain="half loop", stride=5, steps={"max_points": 12}, zeros={"kappa_n": [2.51]})
-    assert run_branch(half, folder / "half.h5", silent()) == "complete"
+    assert run_scene(ClosedScene(m=1, n=2, title="é"), folder / "m1_n2.h5", silent()) == "complete"
+    half = ClosedScene(m=1, n=2, domain="half loop", stride=5, steps={"max_points": 12}, zeros={"kappa_n": [2.51]})
+    assert run_scene(half, folder / "half.h5", silent()) == "complete"
     return folder
 
 
@@ -75,7 +75,7 @@ def test_a_result_is_printed_on_a_screen(results):
     """The branch with its labelled points, and what is made of it: lines and no numbers of arrays."""
     branch = read_branch(results / "m1_n2.h5")
     lines = repr(branch).splitlines()
-    assert lines[0] == f"StoredBranch({branch.about}: {len(branch.points)} points, complete; {branch.stop})"
+    assert lines[0] == f"ClosedBranch({branch.about}: {len(branch.points)} points, complete; {branch.stop})"
     assert [line.split()[:3] for line in lines[1:]] == [
         ["point", str(event["point"]), event["label"].decode()] for event in branch.events
     ]
@@ -256,7 +256,7 @@ def test_an_error_of_the_reader_is_not_called_damage(results):
 HOLD = """
 import sys, time
 from pathlib import Path
-from branches.files import only_run
+from branches.store.files import only_run
 with only_run(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -327,7 +327,7 @@ def test_two_processes_never_hold_it_both(command, tmp_path):
     code = """
 import os, sys, time
 from pathlib import Path
-from branches.files import StoreError, only_run
+from branches.store.files import StoreError, only_run
 folder, ends, times = Path(sys.argv[1]), time.monotonic() + 1, 0
 while time.monotonic() < ends:
     try:

@@ -8,13 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from branches import strip_report, strip_states
-from branches.config import ConfigError, DiagramConfig, dump, load, parse
-from branches.strip import main
-from branches.strip_report import assumptions, deviations
-from branches.strip_states import buckled, circles, ways_out
-from branches.strip_wants import answer, barrier, barriers_at
-from branches.units import quantity
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, load, parse
+from branches.scene.sweep import Sweep
+from branches.scene.units import quantity
+from branches.strip import report as strip_report
+from branches.strip import states as strip_states
+from branches.strip.__main__ import main
+from branches.strip.report import assumptions, deviations
+from branches.strip.states import buckled, circles, ways_out
+from branches.strip.wants import answer, barrier, barriers_at
 from ribbon_model.exact_finite_width import curve
 from ribbon_model.laws import FINITE_WIDTH, RIBBON, TwoBendings
 from ribbon_model.linear import energy_interval, thresholds
@@ -178,8 +181,8 @@ def test_dimensions_for_a_barrier():
 
 @pytest.mark.full
 def test_a_chart_is_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("branches.strip_wants._GAMMAS", np.array([0.1, 1.0]))
-    monkeypatch.setattr("branches.strip_wants._PARTS", np.linspace(0.1, 0.9, 3))
+    monkeypatch.setattr("branches.strip.wants._GAMMAS", np.array([0.1, 1.0]))
+    monkeypatch.setattr("branches.strip.wants._PARTS", np.linspace(0.1, 0.9, 3))
     assert main([*OPTIONS, "--chart", str(tmp_path / "chart.png"), "--turns", "3"]) == 0
     assert capsys.readouterr().out == f"written to {tmp_path / 'chart.png'}\n"
     assert (tmp_path / "chart.png").stat().st_size > 10_000
@@ -232,7 +235,7 @@ def test_a_scene_with_a_strip_is_one_with_its_numbers():
 def test_the_scenes_that_come_with_it(root):
     assert load(root / "configs" / "strip_bandsaw.yaml").Gamma == pytest.approx(BLADE.Gamma)
     diagram = load(root / "configs" / "strip_tape.yaml")
-    assert isinstance(diagram, DiagramConfig) and {config.Gamma for config in diagram.branches} == {TAPE.Gamma}
+    assert isinstance(diagram, Sweep) and {scene.Gamma for scene in diagram.scenes.values()} == {TAPE.Gamma}
 
 
 @pytest.mark.parametrize(

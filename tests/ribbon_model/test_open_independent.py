@@ -27,10 +27,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from branches.config import load
-from branches.display import Display
-from branches.open_job import run_stages
 from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.parse import load
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 #: The complex step: its square vanishes beside 1.
@@ -304,7 +304,7 @@ class Scene:
 
     def __init__(self, name, folder):
         self.name, self.config, path = name, load(CONFIGS / f"{name}.yaml"), Path(folder) / f"{name}.h5"
-        assert run_stages(self.config, path, Display(silent=True)) == "complete"
+        assert run_scene(self.config, path, Display(silent=True)) == "complete"
         self.branch = read_branch(path)
 
     def shooting(self, row, stage):

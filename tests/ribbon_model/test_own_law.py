@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 import pytest
+from branches.display import Display
+from branches.open_job import run_stages
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import jv
 
 import contin
 from branches import config as scenes
-from branches.display import Display
-from branches.open_job import run_stages
 from branches.read import read_branch
 from contin.lowlevel import point_of
 from ribbon_model import exact, laws, stability

@@ -1,0 +1,28 @@
+"""Shapes of strips as they stand in pictures and files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ribbon_model.ends import DIRECTIONS
+from ribbon_model.shape import Shape
+
+#: A direction with a larger component along the tangent is that of a strip that stands upright.
+_UPRIGHT = 0.99
+
+
+def flat_across(shape, law):
+    """The shape with its sections straight along d1 if the law has no generators."""
+    return shape if law.has_rulings else replace(shape, eta=np.zeros_like(shape.eta))
+
+
+def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape:
+    """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
+    z = np.array(up)
+    ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
+    x = np.array(ahead) - z * (z @ ahead)
+    x /= np.linalg.norm(x)
+    axes = np.array([x, np.cross(z, x), z])
+    return replace(shape, centreline=shape.centreline @ axes.T, directors=shape.directors @ axes.T)

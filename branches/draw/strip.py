@@ -1,0 +1,128 @@
+"""A closed strip as a picture: its lit surface with hidden parts hidden, pixel by pixel, at its width."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+FRONT, BACK, EDGE = "#E8A33D", "#7A5195", "#2B1D0E"
+#: Width of a strip of unknown dimensions, in units of L/2 pi. Ten times more covers the loop's own radius.
+WIDTH = 0.3
+#: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
+#: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
+ROOM = 0.8
+#: Pixels of a picture along one side, each the mean of _FINE x _FINE; ten times more take a hundred times longer.
+PIXELS, _FINE = 480, 2
+#: Samples of the surface per fine pixel, in both directions: above sqrt(2), no pixel of the surface is without a sample.
+_DENSE = 1.45
+#: Width of the line along an edge, in pixels and at most as a part of the strip.
+_LINE, _LINE_PART = 1.3, 0.12
+#: The way to the eye (azimuth -45, elevation 32 degrees), and to the lamp, which stands to its left and a little above.
+_EYE = np.array([0.59967, -0.59967, 0.52992])
+_LAMP = np.array([0.29, -0.65, 0.70]) / math.hypot(0.29, 0.65, 0.70)
+#: Stations along a strip at which two strips are compared: the turn between them is a mean over all.
+_STATIONS = 200
+#: Light from everywhere; the rest is the lamp's.
+_AMBIENT = 0.45
+
+
+def steady(strips: dict) -> dict:
+    """The strips, each turned so that it moves as little as possible from the one before (Kabsch's rotation)."""
+    result: dict = {}
+    before = None
+    for point, strip in strips.items():
+        if before is not None:
+            u, _, v = np.linalg.svd(places(strip).T @ before)
+            turn = (u * [1, 1, np.sign(np.linalg.det(u @ v))]) @ v
+            strip = replace(strip, centreline=strip.centreline @ turn, directors=strip.directors @ turn)
+        result[point], before = strip, places(strip)
+    return result
+
+
+def places(strip) -> np.ndarray:
+    """Points of the centreline at equal distances, shape (_STATIONS, 3)."""
+    stations = np.linspace(0, strip.arclength[-1], _STATIONS)
+    return np.column_stack([np.interp(stations, strip.arclength, x) for x in strip.centreline.T])
+
+
+def reach_of(shapes, width: float) -> float:
+    """Half the side of the square in which all these strips have room."""
+    right, up = _screen()
+    corners = np.concatenate([shape.surface(width).reshape(-1, 3) for shape in shapes])
+    return 1.03 * float(np.abs(corners @ np.column_stack([right, up])).max())
+
+
+def draw_strip(axes, shape, width: float, reach: float, pixels: int = PIXELS) -> None:
+    """Draw a strip, seen from above at an angle, as far as ``reach`` from the middle of its centreline."""
+    axes.imshow(rendered(shape, width, reach, pixels), extent=(-reach, reach, -reach, reach), interpolation="antialiased")
+    axes.set_axis_off()
+
+
+def rendered(shape, width: float, reach: float, pixels: int) -> np.ndarray:
+    """The picture of a strip, shape (pixels, pixels, 4), between 0 and 1; alpha is the part of a pixel that is covered.
+
+    The surface is sampled more densely than the pixels, and of the samples in a pixel the one nearest to the eye is seen: no
+    polygons, thus no seams, and parts that pass through each other are cut where they meet.
+    """
+    fine = pixels * _FINE
+    scale = fine / (2 * reach)
+    points, normals, across = _samples(shape, width, scale)
+    place, nearness = _places(points, reach, fine)
+    seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
+    seen = seen[place[seen] >= 0]
+    nearest = np.full(fine * fine, -1)
+    nearest[place[seen]] = seen
+    covered = np.flatnonzero(nearest >= 0)
+    station, number = np.divmod(nearest[covered], len(across))
+    line = min(_LINE * _FINE / scale, _LINE_PART * width)
+    canvas = np.zeros((fine * fine, 4), np.float32)
+    canvas[covered] = _colours(normals[station], width / 2 - np.abs(across[number]) < line)
+    canvas = canvas.reshape(pixels, _FINE, pixels, _FINE, 4).mean(axis=(1, 3))
+    canvas[..., :3] /= np.maximum(canvas[..., 3:], 1e-6)
+    return canvas.clip(0, 1)
+
+
+def _samples(shape, width: float, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of the surface (A, B, 3): along it, with its unit normals there (A, 3); and across it, from v (B,)."""
+    from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+    s, keep = np.unique(shape.arclength, return_index=True)
+    edges = np.linalg.norm(np.diff(shape.surface(width), axis=0), axis=2).sum(axis=0).max()
+    fine = np.linspace(s[0], s[-1], math.ceil(1.05 * edges * scale * _DENSE) + 2)
+    ruling = shape.rulings()
+    middle = CubicHermiteSpline(s, shape.centreline[keep], shape.directors[keep, 2])(fine)  # the tangent is d3
+    ruling, normal = CubicSpline(s, np.stack([ruling, shape.directors[:, 1]], axis=1)[keep])(fine).transpose(1, 0, 2)
+    count = math.ceil(width * np.linalg.norm(ruling, axis=1).max() * scale * _DENSE) + 2
+    across = np.linspace(-width / 2, width / 2, count)
+    points = middle[:, None] + across[:, None] * ruling[:, None]
+    return points, normal / np.linalg.norm(normal, axis=1)[:, None], across
+
+
+def _places(points, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pixel, -1 outside the picture, and the nearness to the eye of all points."""
+    right, up = _screen()
+    screen = points.reshape(-1, 3) @ np.column_stack([right, up, _EYE])
+    pixel = ((screen[:, :2] * [1, -1] + reach) * (fine / (2 * reach))).astype(np.intp)
+    inside = (np.abs(screen[:, :2]) < reach).all(axis=1)
+    return np.where(inside, pixel[:, 1] * fine + pixel[:, 0], -1), screen[:, 2].astype(np.float32)
+
+
+def _screen() -> tuple[np.ndarray, np.ndarray]:
+    """The directions in space that point right and up in the picture."""
+    right = np.cross([0, 0, 1.0], _EYE)
+    right /= np.linalg.norm(right)
+    return right, np.cross(_EYE, right)
+
+
+def _colours(normals, at_edge) -> np.ndarray:
+    """Lit colours (K, 4) of the side that is seen."""
+    from matplotlib.colors import to_rgb
+
+    facing = normals @ _EYE
+    light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LAMP)
+    colours = np.ones((len(normals), 4), np.float32)
+    colours[:, :3] = np.where((facing > 0)[:, None], to_rgb(FRONT), to_rgb(BACK)) * light[:, None]
+    colours[at_edge, :3] = to_rgb(EDGE)
+    return colours

@@ -1,0 +1,127 @@
+"""``python -m branches.graph DIR``: list branches, states and folds of a bifurcation diagram (`branches.graph.closed`)."""
+
+from __future__ import annotations
+
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin(interrupt.NO_FILES)
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from branches.graph import closed as diagram
+from branches.graph.stored import OPEN_FORMAT, read_any
+from branches.store.command import Parser
+from branches.store.files import StoreError
+from contin.lowlevel import exact_text
+
+
+def read(path: str | Path):
+    """Return the diagram in a folder (or in a ``diagram.json``); for a scene, its preview (`branches.graph.preview`).
+
+    Raises
+    ------
+    StoreError
+        There is none, or the scene is none.
+    """
+    if Path(path).suffix not in (".yaml", ".yml"):
+        return read_any(path)
+    from branches.graph.kinds import graph_kind
+    from branches.scene.fields import ConfigError  # scenes take 0.15 s: not for questions about results
+    from branches.scene.parse import load
+
+    try:
+        scene = load(path)
+        return graph_kind(scene).preview(scene)
+    except ConfigError as error:
+        raise StoreError(str(error)) from error
+    except StoreError as error:
+        raise StoreError(f"{str(path)!r}: {error}") from error
+
+
+def parser() -> Parser:
+    """Return the command line."""
+    parser = Parser("graph", "List branches, states and folds of a bifurcation diagram.")
+    parser.add_argument(
+        "folder", help="folder of a diagram, or its diagram.json; or a scene (.yaml), for the exact solution without a run"
+    )
+    parser.add_argument("--where", nargs=2, type=int, metavar=("M", "N"), help="list the special points of the branch (M, N)")
+    parser.add_argument("--at", type=float, metavar="KAPPA_N", help="list the states at this natural curvature")
+    parser.add_argument(
+        "--folds", nargs=2, type=float, metavar=("LOW", "HIGH"), help="list the folds between these natural curvatures"
+    )
+    return parser
+
+
+def main(argv=None) -> int:
+    """Answer the queries; return the exit code."""
+    options = parser().parse_args(argv)
+    try:
+        lines = list(_answers(read(options.folder), options))
+    except StoreError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyError as error:
+        print(f"error: {error.args[0]}", file=sys.stderr)
+        return 2
+    print("\n".join(lines))
+    return 0
+
+
+def _answers(graph, options) -> Iterable[str]:
+    if graph.graph["format"] == OPEN_FORMAT:
+        yield from _of_open_strips(graph, options)
+        return
+    if "source" in graph.graph:
+        yield graph.graph["source"]
+    if options.where:
+        for branch in diagram.course(graph, *options.where):
+            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: {diagram.describe(branch['nodes'])}"
+        for branch in diagram.secondaries(graph):
+            if branch["family"][2:] == tuple(options.where):
+                yield f"  {diagram.describe_secondary(branch)}"
+    if options.at is not None:
+        yield from _states(graph, options)
+    if options.folds:
+        for data in diagram.folds(graph, *options.folds):
+            place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
+            yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold at {place}"
+    if not options.where and options.at is None and not options.folds:
+        found = list(diagram.courses(graph))
+        yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
+        for (law, nu, m, n), nodes in found:
+            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
+
+
+def _states(graph, options) -> Iterable[str]:
+    """Yield the states at a natural curvature."""
+    from branches.graph.at_value import states_at  # Newton's method: not for other questions
+
+    folder = Path(options.folder)
+    for state in states_at(graph, options.at, folder if folder.is_dir() else folder.parent):
+        about = state.about
+        what = f"{about['circle']}-covered circle" if "circle" in about else f"branch {about['branch']}"
+        what = f"secondary {what}, from {about['origin']:.6f}" if "origin" in about else what
+        values = f"kappa* = {state.words('kappa_star')}, energy = {state.words('energy')}"
+        yield f"{about['law']}, nu = {exact_text(about['nu'])}: {what}, {values}"
+
+
+def _of_open_strips(graph, options) -> Iterable[str]:
+    """Yield the labelled points of a diagram of open strips, stage by stage.
+
+    Raises
+    ------
+    StoreError
+        A question that is for closed strips.
+    """
+    from branches.graph.open_strips import listed
+
+    if options.where or options.at is not None or options.folds:
+        raise StoreError(f"{options.folder!r} is the diagram of open strips: it is listed without --where, --at and --folds")
+    yield from listed(graph)
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.run(main))

@@ -1,0 +1,340 @@
+"""The bifurcation diagram as a graph: special points, the pieces of branches between them, and queries.
+
+Nodes are circle bifurcations, folds, branch points and other ends; edges are the pieces of branches between them and carry
+their columns. The command is ``python -m branches.graph DIR`` (`branches.graph`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from branches.graph.interpolation import places
+from branches.graph.stored import COLUMNS
+from branches.scene.labels import SPECIAL, common_index, kind_of
+from contin.lowlevel import exact_text
+from ribbon_model.laws import from_label, label
+from ribbon_model.linear import circle, covering
+
+#: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
+_MEETINGS = ("secondary bifurcation", "primary branch")
+#: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Course:
+    """A primary branch as a diagram holds it.
+
+    Attributes
+    ----------
+    family : dict
+        law, nu, m and n.
+    file, name : str
+        Its result, and the branch in words.
+    nodes : list of (str, dict)
+        Identifiers and attributes of its special points (see `node`), from end to end.
+    pieces : list of dict
+        The columns between consecutive special points, as lists.
+    """
+
+    family: dict
+    file: str
+    name: str
+    nodes: list[tuple[str, dict]]
+    pieces: list[dict]
+
+
+def course_of(branch, file: str) -> Course:
+    """Return the course of a primary branch from its file."""
+    family, special = _family(branch.config), _special(branch)
+    nodes = [_node_of(event, family, branch) for event in special]
+    return Course(family, file, branch.scene.name, nodes, _pieces_of(branch, special))
+
+
+def add_branch(graph, branch, name: str) -> bool:
+    """Add a stored branch to the diagram.
+
+    Parameters
+    ----------
+    graph : networkx.MultiGraph
+    branch : branches.store.branch.StoredBranch
+    name : str
+        Its file; every edge carries it.
+
+    Returns
+    -------
+    bool
+        False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
+        domain, and its images under the symmetries of the primary branch.)
+    """
+    if not branch.config["origin"]:
+        return add_course(graph, course_of(branch, name))
+    family, special = _family(branch.config), _special(branch)
+    nodes = _nodes_of_secondary(graph, special, family, branch)
+    start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
+    if any(data.get("domain") == family["domain"] for _, _, data in start):
+        return False
+    return connect(graph, family, nodes, _pieces_of(branch, special), file=name)
+
+
+def add_course(graph, course: Course) -> bool:
+    """Add a primary branch to the diagram; see `add_branch`."""
+    return connect(graph, course.family, course.nodes, course.pieces, file=course.file)
+
+
+def _family(config: dict) -> dict:
+    """Return what the edges of a branch have in common."""
+    family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
+    if config["origin"]:
+        family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
+    return family
+
+
+def _special(branch) -> list:
+    """Return the labelled points of a branch that are nodes of a diagram."""
+    return [event for event in branch.events if event["label"].decode() in SPECIAL]
+
+
+def _pieces_of(branch, special: list) -> list[dict]:
+    """Return the columns between consecutive special points."""
+    found = []
+    for first, last in pairwise(special):
+        rows = branch.points[first["point"] : last["point"] + 1]
+        names = ("arclength", *branch.columns.mapped("kappa_n"))
+        piece = {column: rows[column].tolist() for column in names}
+        if branch.config["origin"]:
+            piece["force"] = np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()
+        if "index" in rows.dtype.names:
+            piece["index"] = common_index(rows["index"])
+        found.append(piece)
+    return found
+
+
+def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
+    """Return the nodes of a secondary branch; nodes that the diagram already has are reused.
+
+    Identifiers of new nodes give the origin in nine digits, or exactly if another branch has these identifiers.
+    """
+    origin = branch.config["origin"]
+    exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
+    for place in (f"{origin['kappa_n']:.9g}", exact):
+        own = [_node_of(event, family, branch, place) for event in special]
+        nodes = [_known(graph, node) or node for node in own]
+        if not any(node is new and node[0] in graph for node, new in zip(nodes, own)):
+            break
+    return nodes
+
+
+def _known(graph, node):
+    """Return the node of a diagram at a point where a secondary branch meets a primary one, or None."""
+    _, values = node
+    if values["kind"] not in _MEETINGS:
+        return None
+    for name, other in graph.nodes(data=True):
+        same_strip = (other["law"], other["nu"]) == (values["law"], values["nu"])
+        if other["kind"] in _MEETINGS and same_strip and same_place(other, values):
+            return name, other
+    return None
+
+
+def same_place(a: dict, b: dict) -> bool:
+    """Return whether two special points agree in quantities that rigid motions and the starting point do not change."""
+    columns = [column for column in COLUMNS[1:] if column in a and column in b]
+    return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
+
+
+def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
+    """Add a branch from its nodes (see `node`), from end to end, and the columns of the pieces between; see `add_branch`."""
+    if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
+        return False
+    graph.add_nodes_from(nodes)
+    for (a, _), (b, _), columns in zip(nodes, nodes[1:], pieces):
+        graph.add_edge(a, b, **family, **attributes, **columns)
+    return True
+
+
+def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
+    """Return whether a branch of the diagram begins or ends on the circle of this covering index with this wavenumber."""
+    return _circle({"law": law, "nu": nu, "n": mode}, covering) in graph
+
+
+def _circle(family, covering: int) -> str:
+    return f"{_strip(family)} circle {covering} mode {family['n']}"
+
+
+def _strip(family) -> str:
+    """Return the law and nu of a branch for identifiers of nodes; exact, so that nodes can be found by them."""
+    return f"{family['law']} nu={exact_text(family['nu'])}"
+
+
+def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -> tuple[str, dict]:
+    """Return identifier and attributes of a special point, the ``number``-th point of its branch.
+
+    The identifier of a circle does not depend on the branch: it is the covering index (negative if it is curled against its
+    natural curvature) and the wavenumber. Identifiers of other points contain the branch (m, n) and, on a secondary
+    branch, its ``origin``.
+    """
+    attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
+    if kind == "circle":
+        law, Gamma = from_label(family["law"])
+        parameters = {"nu": family["nu"], "Gamma": Gamma}
+        index = covering(law, parameters, *(attributes[name] for name in ("kappa_n", "kappa_star", "energy")))
+        return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
+    branch = f"({family['m']},{family['n']})"
+    if origin:
+        branch += f" from {origin} on the {family['domain']}"
+    return f"{_strip(family)} {branch} {kind} {number}", attributes | {"m": family["m"], "n": family["n"]}
+
+
+def _node_of(event, family, branch, origin: str = ""):
+    """Return the node of a labelled point of a branch file."""
+    values = {column: float(event[column]) for column in branch.columns.mapped("kappa_n")}
+    values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
+    kind = kind_of(event["label"].decode(), values["what"], branch.reason, "origin" in family)
+    return node(family, kind, values, int(event["point"]), origin)
+
+
+# --- queries ------------------------------------------------------------------------------------------------------
+
+
+def families(graph) -> list[tuple]:
+    """Return the (law, nu, m, n) of all primary branches, in order; (m, n) is that of the end where the run started."""
+    return sorted({family_of(data) for _, _, data in graph.edges(data=True) if "origin" not in data})
+
+
+def pieces(graph, family: tuple) -> list[tuple]:
+    """Return the edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
+    return _by_family(graph).get(family, [])
+
+
+def _by_family(graph) -> dict[tuple, list[tuple]]:
+    """Return the edges of every primary branch, from end to end, in one pass over the diagram."""
+    found: dict[tuple, list[tuple]] = {}
+    for edge in graph.edges(data=True):
+        if "origin" not in edge[2]:
+            found.setdefault(family_of(edge[2]), []).append(edge)
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+    return found
+
+
+def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """Return the secondary branches: their origin (family, origin, mode, domain, file), edges from end to end, and nodes."""
+    found = {}
+    for edge in graph.edges(data=True):
+        data = edge[2]
+        if "origin" in data and law in (None, data["law"]) and nu in (None, data["nu"]):
+            found.setdefault(data["file"], []).append(edge)
+    result = []
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+        first = edges[0][2]
+        about = {name: first[name] for name in ("origin", "mode", "domain", "file")}
+        result.append({"family": family_of(first), **about, "edges": edges, "nodes": _in_order(graph, edges)})
+    return sorted(result, key=lambda branch: (branch["family"], -branch["origin"], branch["domain"]))
+
+
+def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """Return the special points along the branch (m, n), in order from the m-covered circle, for the given law and nu or all.
+
+    Raises
+    ------
+    KeyError
+        The diagram has no such branch.
+    """
+    result = []
+    for (law_, nu_, _, n_), nodes in courses(graph):
+        if n_ != n or law not in (None, law_) or nu not in (None, nu_):
+            continue
+        if nodes[-1].get("covering") == m:
+            nodes.reverse()
+        if nodes[0].get("covering") == m:
+            result.append({"law": law_, "nu": nu_, "nodes": nodes})
+    if not result:
+        raise KeyError(f"the diagram has no branch (m, n) = ({m}, {n})")
+    return result
+
+
+def courses(graph) -> Iterator[tuple[tuple, list[dict]]]:
+    """Yield (law, nu, m, n) and the special points, from end to end, of every primary branch, in order."""
+    for family, edges in sorted(_by_family(graph).items(), key=lambda item: item[0]):
+        yield family, _in_order(graph, edges)
+
+
+def family_of(data) -> tuple:
+    return data["law"], data["nu"], data["m"], data["n"]
+
+
+def _in_order(graph, edges) -> list[dict]:
+    """Return the nodes along consecutive edges, whose ends networkx may give in either order."""
+    nodes = []
+    for a, b, data in edges:
+        ends = sorted((a, b), key=lambda node: abs(graph.nodes[node]["kappa_star"] - data["kappa_star"][0]))
+        nodes = nodes or [graph.nodes[ends[0]]]
+        nodes.append(graph.nodes[ends[1]])
+    return nodes
+
+
+def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """Return all equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
+
+    Values between computed points come from a cubic spline over arclength; `branches.at_value` solves them. States on branches
+    have the number of their ``edge`` and their ``arclength`` on it.
+    """
+    found = []
+    materials = {family[:2] for family in families(graph) if law in (None, family[0]) and nu in (None, family[1])}
+    nodes = (data for _, data in graph.nodes(data=True) if data["kind"] == "circle")
+    for law_, nu_, m in sorted({(data["law"], data["nu"], data["covering"]) for data in nodes}):
+        if (law_, nu_) in materials:
+            found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
+    edges = [
+        (edge, data)
+        for edge, (*_, data) in enumerate(graph.edges(data=True))
+        if law in (None, data["law"]) and nu in (None, data["nu"])
+    ]
+    for number, place in places([data for _, data in edges], "kappa_n", kappa_n, ("arclength", *COLUMNS[2:])):
+        edge, data = edges[number]
+        left = {"origin": data["origin"]} if "origin" in data else {}
+        about = {"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left}
+        found.append({**about, "kappa_n": kappa_n, "edge": edge, **place})
+    return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
+
+
+def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
+    """Return kappa* and energy of a planar circle."""
+    material, Gamma = from_label(law)
+    values = circle(material, m, kappa_n, {"nu": nu, "Gamma": Gamma})
+    return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
+
+
+def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """Return the folds with low <= kappa_n <= high, in order of kappa_n."""
+    nodes = [dict(data) for _, data in graph.nodes(data=True) if data["kind"] == "fold" and low <= data["kappa_n"] <= high]
+    nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
+    return sorted(nodes, key=lambda data: data["kappa_n"])
+
+
+# --- in words ------------------------------------------------------------------------------------------------------
+
+
+def describe(nodes) -> str:
+    """Return the special points of one branch in one line."""
+    return " -> ".join(map(describe_node, nodes))
+
+
+def describe_secondary(branch: dict) -> str:
+    """Return the special points of a secondary branch (see `secondaries`) in one line."""
+    return f"{branch['mode']}, {branch['domain']}: {describe(branch['nodes'])}"
+
+
+def describe_node(node) -> str:
+    """Return a special point in words."""
+    if node["kind"] == "circle":
+        return f"circle {node['covering']} at {node['kappa_n']:.6f}"
+    if node["kind"] == "leaves":
+        return f"stops at {node['kappa_n']:.10g}, the scene's own limit"
+    return f"{node['kind']} at {node['kappa_n']:.6f}"

@@ -1,0 +1,111 @@
+"""``python -m branches.plot RESULT``: a branch with the strip along it, a diagram, or any column against any other."""
+
+from __future__ import annotations
+
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin("no picture was written")
+
+import sys
+from pathlib import Path
+
+from branches.store.command import Parser, complain, write_output
+from branches.store.files import StoreError, check_picture, write_picture
+from contin.lowlevel import exact_text
+
+
+def parser() -> Parser:
+    """Return the command line."""
+    parser = Parser("plot", "Draw a branch with the strip along it, or the bifurcation diagram of a folder or a scene.")
+    parser.add_argument(
+        "result", metavar="RESULT",
+        help="a branch file; the folder of a diagram; or a scene (.yaml) of closed strips, for an instant preview from the "
+        "exact quadrature, with nothing computed by continuation",
+    )  # fmt: skip
+    parser.add_argument("--out", help="picture to write, .pdf, .svg or .png (default: beside the result, .pdf)")
+    of_branch = parser.add_argument_group("a branch")
+    of_branch.add_argument("--x", metavar="COLUMN", help="column across (default: the number that is followed)")
+    of_branch.add_argument("--y", metavar="COLUMN", help="column upwards (default: what is conjugate to it)")
+    of_branch.add_argument("--shapes", type=int, default=6, help="number of strips drawn (default 6)")
+    of_branch.add_argument(
+        "--width", type=float,
+        help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, or 0.3); "
+        "narrower where its generators would cross",
+    )  # fmt: skip
+    diagram = parser.add_argument_group("a diagram")
+    diagram.add_argument("--window", nargs=2, type=float, default=(-8.0, 14.0), metavar=("LOW", "HIGH"), help="of kappa_n")
+    diagram.add_argument("--law", help="which law, where the diagram has several")
+    diagram.add_argument("--nu", type=float, help="which nu, where the diagram has several")
+    diagram.add_argument("--plain", action="store_true", help="only in conjugate coordinates, not disentangled beside")
+    return parser
+
+
+def main(argv=None) -> int:
+    """Draw; return the exit code."""
+    options = parser().parse_args(argv)
+    path = Path(options.result)
+    try:
+        _check(options)
+        draw = _diagram if path.is_dir() or path.suffix in (".yaml", ".yml", ".json") else _branch
+        figure, out, more = draw(options, path)
+        check_picture(out)
+        write_picture(figure(), out)
+    except (StoreError, ValueError) as error:
+        complain(f"error: {error}")
+        return 2
+    write_output(f"{more}written to {out}\n")
+    return 0
+
+
+def _check(options) -> None:
+    """Raise ValueError on an option that makes no picture."""
+    if not 0 <= options.shapes <= 12:
+        raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
+    if options.width is not None and not 0 < options.width <= 2:
+        raise ValueError(f"--width {options.width:g}: must lie between 0 and 2")
+    if not options.window[0] < options.window[1]:
+        raise ValueError(f"--window {options.window[0]:g} {options.window[1]:g}: the first number must be the smaller")
+
+
+def _branch(options, path: Path):
+    """Return a function that draws, the picture to write, and a line about what is drawn."""
+    from branches.store.read import read_branch
+
+    out = Path(options.out) if options.out else path.with_suffix(".pdf")
+
+    def figure():
+        axes = {name: column for name, column in (("x", options.x), ("y", options.y)) if column}
+        return read_branch(path).plot(options.shapes, options.width, **axes)
+
+    return figure, out, ""
+
+
+def _diagram(options, path: Path):
+    from branches.graph.__main__ import read
+    from branches.graph.picture import figure
+    from branches.graph.stored import read as read_closed
+
+    out = Path(options.out) if options.out else path / "diagram.pdf" if path.is_dir() else Path(f"{path.stem}.pdf")
+    graph = read_closed(path) if path.is_dir() else read(path)
+    law, nu, more = choose(graph, options.law, options.nu)
+    return (lambda: figure(graph, law, nu, tuple(options.window), not options.plain)), out, more
+
+
+def choose(graph, law, nu):
+    """Return the law and nu to draw: those asked for, or the first that the diagram has; and a line that says so."""
+    from branches.graph.closed import families
+
+    have = sorted({family[:2] for family in families(graph)}, key=lambda pair: (pair[0] != "ribbon", pair))
+    found = [pair for pair in have if law in (None, pair[0]) and nu in (None, pair[1])]
+    if not found:
+        known = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in have)
+        raise StoreError(f"--law {law} --nu {nu}: the diagram has {known}")
+    law, nu = found[0]
+    others = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in found[1:])
+    more = f"drawn: {law}, nu = {exact_text(nu)}; the diagram also has {others} (--law, --nu)\n" if others else ""
+    return law, nu, more
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.run(main))

@@ -1,0 +1,182 @@
+"""``python -m branches.run CONFIG``: follow a branch to its end, show its points, and write it to an HDF5 file."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from branches.store import interrupt
+
+# Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
+
+EXIT_BAD_INPUT, EXIT_STOPPED_SHORT = 2, 1
+
+
+def parser():
+    """Return the command line."""
+    from branches.store.command import Parser
+
+    parser = Parser(
+        "run",
+        "Follow one branch of buckled equilibria of a closed elastic strip, or the stages of an open one, and write it to an "
+        "HDF5 file.",
+        "Exit code: 0 done, 1 the run failed on the way (the file holds the points before), 2 bad input, 130 interrupted.",
+    )
+    parser.add_argument("config", metavar="CONFIG", help="the scene: a YAML file, or a name that `ribbon scenes` lists")
+    parser.add_argument(
+        "--out", metavar="PATH", help="result file or folder (default: the name of the config with .h5, in this folder)"
+    )
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field, as in --set nu=0.2 --set mesh.degree=5"
+    )
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes for a scene of many branches (default: number of cores)"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=3600.0,
+        metavar="S",
+        help="largest time in seconds for each branch of a scene of many branches",
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
+    parser.add_argument("--quiet", action="store_true", help="print the summary only")
+    existing = parser.add_mutually_exclusive_group()
+    existing.add_argument("--resume", action="store_true", help="continue an unfinished result file; start if there is none")
+    existing.add_argument("--overwrite", action="store_true", help="replace a result file of another scene")
+    return parser
+
+
+def main(argv=None) -> int:
+    """Run the command; return the exit code."""
+    from branches.store.command import survive_any_encoding, write_output
+
+    survive_any_encoding()
+    try:
+        return _run(parser().parse_args(argv))
+    finally:
+        write_output()
+
+
+def _run(options) -> int:
+    from branches.scene.fields import ConfigError
+    from branches.scene.packaged import found
+    from branches.scene.parse import load
+
+    options.config = found(options.config)
+    try:
+        scene = load(options.config, options.set)
+        if scene.many:
+            return _run_many(scene, options)
+        path = output_path(options)
+    except ConfigError as error:
+        return _refuse(error)
+    from branches.run.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
+    from branches.run.runner import run_scene
+    from branches.store.files import StoreError
+    from contin import ContinError
+
+    try:
+        outcome = run_scene(scene, path, display, resume=options.resume, overwrite=options.overwrite)
+    except (ConfigError, StoreError, ContinError) as error:
+        display.clear()
+        return _refuse(error)
+    from branches.scene.stages import stages_of
+
+    if outcome == "complete" and stages_of(scene)[0].has_barriers:
+        _tell_barriers(path, display, options.quiet)
+    return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+
+
+def _tell_barriers(path, display, quiet: bool) -> None:
+    """Print the barriers of the stable states of an open strip."""
+    from threadpoolctl import threadpool_limits
+
+    from branches.run.barriers import report
+    from branches.store.read import read_branch
+
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        lines = report(read_branch(path), quiet)
+    if lines:
+        display.note("\n".join(lines))
+
+
+def _run_many(sweep, options) -> int:
+    """Run a scene of many branches; its folder gets one file per branch."""
+    interrupt.change(interrupt.BRANCHES_KEPT)
+    from pathlib import Path
+
+    from branches.scene.fields import ConfigError
+
+    if options.resume:
+        raise ConfigError(
+            "--resume: is not for scenes of many branches; run the scene again, it computes the branches that are missing"
+        )
+    if options.workers is not None and options.workers < 1:
+        raise ConfigError(f"--workers {options.workers}: must be at least 1")
+    if not options.time_limit > 0:
+        raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
+    folder = Path(options.out or Path(options.config).stem)
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
+    from branches.run.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
+    from branches.run.executor import ExecutorError
+    from branches.run.many import run_many
+    from branches.store.files import StoreError
+    from contin import ContinError
+
+    try:
+        outcome = run_many(
+            sweep, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
+            overwrite=options.overwrite,
+        )  # fmt: skip
+    except (StoreError, ExecutorError, ContinError) as error:
+        display.clear()
+        return _refuse(error)
+    return 0 if outcome == "complete" else EXIT_STOPPED_SHORT
+
+
+def _refuse(error: Exception) -> int:
+    from branches.store.command import complain
+
+    complain(f"error: {error}")
+    return EXIT_BAD_INPUT
+
+
+def output_path(options):
+    """Return the result file of the command line.
+
+    Raises
+    ------
+    ConfigError
+        A file or folder in its place that no result may replace.
+    """
+    from pathlib import Path
+
+    from branches.scene.fields import ConfigError
+
+    if options.out == "":
+        raise ConfigError("--out '': must name a file or a folder")
+    name = Path(options.config).stem + ".h5"
+    path = Path(options.out or name)
+    try:
+        if path.is_dir() or (options.out or "").endswith(("/", os.sep)):
+            path = path / name
+        if path.is_dir():
+            raise ConfigError(f"--out {str(path)!r}: is a folder; name a file, or another folder")
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"--out {str(path)!r}: is neither a file nor a folder")
+        if path.exists() and path.samefile(options.config):
+            raise ConfigError(f"--out {str(path)!r}: is the config itself; name another file")
+    except OSError as error:
+        raise ConfigError(f"--out {str(path)!r}: cannot be accessed: {error.strerror}") from error
+    return path
+
+
+if __name__ == "__main__":
+    interrupt.begin()
+    sys.exit(interrupt.run(main))

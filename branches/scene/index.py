@@ -1,0 +1,170 @@
+"""The index along a branch: a column, and test functions of secondary bifurcations."""
+
+from __future__ import annotations
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from branches.scene.columns import Change
+from branches.scene.stage import Watch
+from contin import ConvergenceError, Event
+from contin.lowlevel import correct
+from ribbon_model.convexity import margin
+from ribbon_model.laws import Law
+from ribbon_model.modes import REVERSALS, Mode
+from ribbon_model.secondary import force
+from ribbon_model.solution import Solution
+from ribbon_model.stability import Stability
+
+#: Label of a secondary bifurcation. It breaks a symmetry of the domain, so the equations of the domain do not detect it.
+LABEL = "SB"
+#: The value of an index that could not be decided (on a bifurcation, an eigenvalue is zero).
+UNDECIDED = -1
+_ON_CIRCLE = 1e-6
+#: Near a primary branch, with less force than this, ...
+_LITTLE_FORCE = 0.5
+#: ... an eigenvalue below this may be one that vanishes there, and its sign has no meaning.
+_ZERO_BESIDE = 1e-8
+#: The class that keeps all symmetry. One of its eigenvalues passes zero at a fold, which the engine detects.
+_FULL = (0, "even")
+#: With a smaller margin of convexity the law ends, and there is no index.
+_CONVEX = 1e-6
+#: Number of points inside a step where the sign is evaluated: two secondary bifurcations in one step leave it unchanged.
+#: Pairs closer than a quarter of a step are missed.
+_LOOKS = 3
+#: The computed value of the known zero, that of the shift of phase, is the error of the eigenvalues. If it is larger, the mesh
+#: of the state is too coarse for its index, and is halved at most so often. (Strips of finite width that are nearly
+#: folded need this: the zero was 1e-2, and an eigenvalue of 1e-3 changed its sign twice.)
+_RESOLVED, _HALVINGS = 1e-6, 4
+#: A point with a larger residual is not on the branch, and the shift of phase is not a zero there.
+_ON_BRANCH = 1e-7
+#: Number of points whose stability is kept: all symmetry classes are evaluated at the same points of a step.
+_KEPT = 2 * _LOOKS + 4
+#: Distance from a bifurcation, along the branch, at which the index is computed, relative to 1 + |x|.
+_BESIDE = 1e-3
+
+
+class SymmetryWatch(Watch):
+    """Compute the index of points of one branch, each once.
+
+    Parameters
+    ----------
+    law : Law
+    system, x :
+        The first point, which determines the symmetry of the branch.
+    from_circle : bool
+        The branch begins on a circle, and may end on one.
+    """
+
+    def __init__(self, law: Law, system, x, from_circle: bool = True):
+        self._blas, self._from_circle = ThreadpoolController(), from_circle
+        self._known: dict = {}
+        self._margin = margin(law)
+        self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
+        names = [entry.name for entry in self.at(system, x).classes]
+        self.monitors = [self._monitor(name) for name in names if name != _FULL]
+
+    def at(self, system, x, point=None) -> Stability:
+        """Return the stability of a state; for a ``point`` of the branch (with tangent) on the mesh that the index needs."""
+        key = id(system), x.tobytes()
+        if key not in self._known:
+            result = self._resolved(system, x, point)
+            while len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = system, result  # keep the system, so that no other object gets its id
+        return self._known[key][1]
+
+    def _resolved(self, system, x, point) -> Stability:
+        """Return the stability on the system's mesh, or on a finer one if the known zero of a point is not small."""
+        result = self._evaluated(system, x)
+        if point is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
+            return result
+        tangent = point.tangent
+        for _ in range(_HALVINGS):
+            system, carry = system.refined()
+            x, tangent = carry(x), carry(tangent)
+            row = system.weights * tangent
+            try:
+                x = correct(system, x, row, row @ x).x
+            except ConvergenceError:
+                break
+            result = self._evaluated(system, x)
+            if result.residual <= _RESOLVED:
+                break
+        return result
+
+    def _evaluated(self, system, x) -> Stability:
+        """Return the stability on the system's mesh."""
+        with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
+            return Solution.at(system, x).index()
+
+    def _within_law(self, system, x, point) -> Stability | None:
+        """Return the stability of a state; None where the energy is not convex and there is no index."""
+        if self._margin is None:
+            return self.at(system, x, point)
+        if not self._margin(system, x) > _CONVEX:
+            return None
+        try:
+            return self.at(system, x, point)
+        except ValueError:  # not convex between the points where the margin was computed
+            return None
+
+    def index(self, point) -> int:
+        """Return the index of a point, or `UNDECIDED`."""
+        result = self._within_law(point.system, point.x, point)
+        return result.index if result is not None and result.decided else UNDECIDED
+
+    def change(self, point) -> Change:
+        """Return the index on both sides of a fold or secondary bifurcation, from two nearby points on the branch."""
+        if point.label not in ("LP", LABEL):
+            return Change()
+        before, after = (self._beside(point, side) for side in (-1, 1))
+        if point.label == "LP":
+            return Change(before, after, 1)
+        return Change(before, after, *_broken(point))
+
+    def _beside(self, point, side: int) -> int:
+        """Return the index at a small distance along the branch."""
+        tangent = point.tangent / np.linalg.norm(point.tangent)
+        distance = side * _BESIDE * (1 + np.linalg.norm(point.x))
+        try:
+            there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
+        except ConvergenceError:  # for example at a bifurcation that was not located
+            return UNDECIDED
+        result = self._within_law(point.system, there.x, point)
+        return result.index if result is not None and result.decided else UNDECIDED
+
+    def _monitor(self, name) -> Event:
+        """Return the test function of one symmetry class: its determinant, which is zero where the symmetry is broken."""
+
+        def determinant(trial):
+            try:
+                result = self._within_law(trial.system, trial.x, trial)
+            except ValueError:  # too far from the branch: no closed loop, or no convex energy
+                return np.nan
+            if result is None:
+                return np.nan  # no zero: the run ends before
+            entry = result[name]
+            values = entry.eigenvalues
+            if not self._from_circle:
+                beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < _ZERO_BESIDE
+                return np.nan if beside else float(np.prod(values))
+            if (
+                name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE
+            ):  # zeros of rotations of a circle, in place of the phase of the branch
+                values = values[np.abs(values) > _ON_CIRCLE]
+            return float(np.prod(values))
+
+        mode = Mode(self._n, *name)
+        return Event(LABEL, str(mode), determinant, looks=_LOOKS, describe=lambda trial: mode)
+
+
+def _broken(point) -> tuple[int, str]:
+    """Return the dimension of the kernel of a secondary bifurcation, and the symmetries that it breaks."""
+    reversal, how = point.system.problem.on.reversal, point.details
+    if reversal:  # a half loop has only one reversal
+        return 1, REVERSALS[reversal]
+    n = how.n
+    if not how.keeps:
+        return how.dimension, f"{n} mirrors, {n} two-fold axes"
+    return how.dimension, " or ".join(how.broken(reversal) for reversal in how.keeps)

@@ -1,0 +1,99 @@
+"""Labels of special points: their words, what they are in diagrams and on pages, and their marks in pictures. The one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
+#: known: its tolerance is this part of the size of a number.
+_NOTHING = 1e-12
+# Okabe-Ito colours: told apart by the colour-blind, and in print
+FOLD, END, USER, SECONDARY = "#D55E00", "#000000", "#009E73", "#CC79A7"
+
+
+@dataclass(frozen=True)
+class Label:
+    """One of AUTO's labels, or ours.
+
+    Attributes
+    ----------
+    word : str
+        In summaries.
+    kind : str
+        Of a point that no name tells more of; see `kind_of`.
+    marker, colour, size :
+        In pictures of one branch, as matplotlib takes them.
+    told : bool
+        Whether pictures write the value of the number that is followed beside it.
+    """
+
+    word: str
+    kind: str
+    marker: str
+    colour: str
+    size: int
+    told: bool = False
+
+
+LABELS = {
+    "LP": Label("fold", "fold", "*", FOLD, 170, True),
+    "BP": Label("branch point", "branch point", "o", END, 45),
+    "SB": Label("secondary bifurcation", "secondary bifurcation", "D", SECONDARY, 40),
+    "UZ": Label("user value", "user value", "D", USER, 40),
+    "EP": Label("end", "end", "o", END, 45),
+    "MX": Label("end", "lost", "x", END, 40),
+}
+#: What a person feels or sees where a number of an open strip is followed: its conjugate, up to a sign. Others are shown with
+#: the energy.
+CONJUGATE = {
+    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
+    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
+    "weight": "rise", "roller": "F_roller",
+}  # fmt: skip
+#: Labels of points at which the pieces of a branch begin and end.
+SPECIAL = ("LP", "BP", "SB", "EP", "MX")
+#: Marks of kinds in diagrams: marker, colour, size.
+MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", END, 16), "secondary bifurcation": ("D", SECONDARY, 26)}
+#: Kinds as the explorer page knows them; the others are 'end'.
+ON_PAGE = {
+    "circle": "circle", "fold": "fold", "secondary bifurcation": "secondary", "primary branch": "secondary",
+    "user value": "user", "lost": "lost", "leaves": "limit",
+}  # fmt: skip
+
+
+def label_of(text: str) -> Label:
+    """The label of these letters; that of an end for letters of another version."""
+    return LABELS.get(text, LABELS["EP"])
+
+
+def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
+    """What a labelled point is in a diagram.
+
+    Parameters
+    ----------
+    label, name : str
+        Of the point.
+    reason : str
+        Why its run stopped.
+    secondary : bool
+        Whether it is on a secondary branch.
+    """
+    if name == "start":
+        return "secondary bifurcation" if secondary else "circle"
+    if name == "trivial branch":
+        return "circle"
+    if name == "primary branch":
+        return name
+    kind = label_of(label).kind
+    return "leaves" if kind == "end" and reason == "limit" else kind
+
+
+def without_round_off(value: float, largest: float) -> float:
+    """Return a value of a stage, 0 where it is round-off; ``largest`` is the largest one of the stage."""
+    return 0.0 if abs(value) <= _NOTHING * abs(largest) else value
+
+
+def common_index(values) -> int:
+    """Return the index on a piece between special points, or -1 if it is undecided or changes along the piece."""
+    decided = set(values[1:-1][values[1:-1] >= 0].tolist())
+    return decided.pop() if len(decided) == 1 else -1

@@ -1,0 +1,370 @@
+"""A stage of an open strip: from a labelled point of an earlier one, by default its end, to a value of the followed number."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from branches.scene.advice import no_state, reached
+from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns, error_of
+from branches.scene.errors import errors_of
+from branches.scene.fields import ConfigError
+from branches.scene.labels import CONJUGATE, label_of, without_round_off
+from branches.scene.open_strip import OpenScene
+from branches.scene.stage import Stage, Watch
+from contin import ContinError, ConvergenceError, MeshControl, Point, ProblemError, Reason, Settings
+from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text, point_of
+from ribbon_model.changed_ends import with_ends
+from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
+from ribbon_model.open_strip import REACTIONS, OpenStrip
+
+#: A stage may start outside its limits by this part of them: it may start where another one has stopped. Points at limits are
+#: located to 1e-12; ten times larger, starts that are outside by that are taken for starts at the limit.
+_SLACK = 1e-9
+#: A state keeps a symmetry that moves it by less than this.
+_KEEPS = 1e-6
+#: Words of the columns, and those of axes. Lengths are over that of the strip, unless the scene has dimensions.
+_WORDS = {
+    "distance": ("place of the last end along the tangent of the first one", "distance of the ends"),
+    "rise": ("place of the last end along the normal of the first one", "displacement along the normal"),
+    "shear": ("place of the last end along the width of the first one", "displacement along the width"),
+    "turn": ("angle of the last end about the tangent of the first one", "turn of the end"),
+    "bend": ("angle of the last end about the width of the first one", "bend of the end"),
+    "swing": ("angle of the last end about the normal of the first one", "swing of the end"),
+    "stroke": ("further displacement of the last end", "displacement of the end"),
+    "roller": ("place of the strip at the roller, along the direction in which it holds", "place at the roller"),
+    "force_width": ("dead force at the last end along the width", "force along the width"),
+    "force_normal": ("dead force at the last end along the normal", "force along the normal"),
+    "force_tangent": ("dead force at the last end along the tangent; negative compresses", "force along the tangent"),
+    "moment": ("dead moment about the hinge of the last end", "moment at the hinge"),
+    "weight": ("weight per length", "weight per length"),
+    "foundation": ("stiffness per length of the foundation", "stiffness of the foundation"),
+    "kappa_n": ("natural curvature about the width", "natural curvature"),
+    "kappa_2": ("natural curvature about the normal", "natural curvature in the plane"),
+    "tau_n": ("natural twist", "natural twist"),
+    "D11": ("bending stiffness of the plate along the strip, times the width", "bending stiffness along"),
+    "D12": ("coupling of the bendings along and across the strip", "coupling of bendings"),
+    "D22": ("bending stiffness across the strip", "bending stiffness across"),
+    "D66": ("twisting stiffness", "twisting stiffness"),
+    "nu": ("Poisson's ratio", "Poisson's ratio"),
+    "Gamma": ("w^2/(h L) of the law finite width", "Γ"),
+    "softness": ("compliance about the normal", "softness in the plane"),
+    "energy": ("elastic energy, zero in the natural state, and potential of weight and foundation", "energy"),
+    "potential": ("energy and the potential of dead loads at the last end: the one of which the index is", "potential"),
+    "F_roller": ("force of the roller on the strip", "force of the roller"),
+}  # fmt: skip
+_WORDS |= {
+    f"{start}{kind}_{along}": (
+        f"{what} on the strip at its {end} end, along the {along} of the first one",
+        f"{what} {'along' if kind == 'F' else 'about'} the {along}{' at the first end' if start else ''}",
+    )
+    for start, end in (("", "last"), ("start_", "first"))
+    for kind, what in (("F", "force"), ("M", "moment"))
+    for along in DIRECTIONS
+}
+
+
+class SymmetriesWatch(Watch):
+    """Index and broken symmetries of points, as contin found them."""
+
+    def __init__(self, strip: OpenStrip):
+        self._symmetries = strip.problem.symmetries
+
+    def index(self, point: Point) -> int:
+        return -1 if point.index is None else point.index
+
+    def change(self, point: Point) -> Change:
+        before, after = point.index_change or (None, None)
+        states = point.system.states(point.x)[:, : point.system.problem.dimension]
+        kept = [name for name, image in self._symmetries.items() if np.abs(image(None, states) - states).max() < _KEEPS]
+        broken = ", ".join(name for name in point.breaks if name in kept)
+        return Change(-1 if before is None else before, -1 if after is None else after, point.nullity, broken)
+
+
+class OpenStage(Stage):
+    """A stage of an open scene."""
+
+    starts_others = has_barriers = True
+
+    def __init__(self, scene: OpenScene, number: int):
+        self.scene, self.number, self.stage, self.strip = scene, number, scene.stages[number - 1], scene.strip(number)
+        self.follow, self.problem = self.stage.follow, self.strip.problem
+        self.free, self.watch = (self.follow, *self.problem.multipliers), SymmetriesWatch(scene.strip())
+        felt = CONJUGATE.get(self.follow, "energy")
+        self.conjugate = felt if felt in self.columns().all else "energy"
+        sizes = scene.dimensions
+        length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
+        modulus = "1" if sizes is None else f"1 ({scene.modulus:.12g} N m^2)"
+        self.units = f"bending modulus B = {modulus}, length L = {length}"
+        unit = scene.unit(self.follow)
+        self.title = f"stage {number}: {self.follow}{f' in {unit}' if unit else ''}\n"
+        self.head = f"{self.follow:>14s}     energy      F_tangent      index   N  it"
+        self._largest = abs(self.stage.to)
+
+    # --- the run --------------------------------------------------------------------------------------------------------
+
+    def start(self, earlier: Sequence[Sequence[Point]] = ()) -> Continuation:
+        return self._run(first_state(self.scene) if self.number == 1 else self._origin(earlier))
+
+    def resume(self, state: State, first: tuple[Collocation, np.ndarray, np.ndarray], earlier) -> Continuation:
+        settings = self.start(earlier).settings  # those of the stage's start, to the last bit
+        return Continuation(state.system, state.x, settings, state=state, start=first)
+
+    def judge(self, point: Point, run: Continuation) -> Point | None:
+        """A point at a value of a column has that value in the units of the scene."""
+        name, equals, _ = point.name.partition(" = ")
+        if not equals or self.scene.dimensions is None or name not in (*point.parameters, *point.functionals):
+            return point
+        return dataclasses.replace(
+            point, name=f"{name} = {point[name] * self.scene.factor(name):.6g} {self.scene.unit(name)}".rstrip()
+        )
+
+    def told(self, run: Continuation, last: Point) -> Stop:
+        if run.stop.reason not in (Reason.NO_CONVERGENCE, Reason.EVENT):
+            return reached(run.stop, last, run, self._shown)
+        law = self.strip.explained(run)
+        if law is not None:
+            stop = Stop(run.stop.reason, law)
+        elif run.stop.reason == Reason.NO_CONVERGENCE:
+            here = run.state.system.parameter(run.state.x, self.follow)
+            here = without_round_off(here, max(map(abs, run.settings.limits[self.follow])))
+            stop = no_state(run, self._shown(self.follow, here))
+        else:
+            stop = run.stop
+        return dataclasses.replace(stop, message=f"stage {self.number}: {stop.message}")
+
+    def notes(self, run: Continuation) -> list[str]:
+        units = " (numbers in units of L and B)" if self.scene.dimensions is not None else ""
+        return [f"stage {self.number}: {note}{units}" for note in run.notes]
+
+    def _shown(self, name: str, value: float) -> str:
+        """Return a number as a scene states it, with its unit."""
+        return f"{name} = {value * self.scene.factor(name):.10g} {self.scene.unit(name)}".rstrip()
+
+    def _origin(self, labelled: Sequence[Sequence[Point]]) -> Point:
+        """Return the labelled point from which a stage starts.
+
+        Raises
+        ------
+        ConfigError
+            There is none.
+        """
+        stage = self.stage
+        source = stage.stage or self.number - 1
+        points = labelled[source - 1]
+        place = stage.place_among([(point.label, point.name) for point in points])
+        if place is None:
+            there = ", ".join(point.label for point in points)
+            raise ConfigError(f"start_at: {stage.start_at!r} is not among the points of stage {source}: {there}")
+        return points[place]
+
+    def _run(self, origin: Point) -> Continuation:
+        """Return the run of a stage.
+
+        Raises
+        ------
+        ConfigError
+            The stage starts outside its limits, or not from this point.
+        """
+        try:
+            run = self._begun(origin)
+        except ConvergenceError as error:
+            followed = self.stage.follow
+            raise ConfigError(
+                f"follow: {followed!r}: the state at the start of the stage was not found again with this number free; follow "
+                "another one first, or refine the mesh (mesh.intervals, mesh.tolerance)"
+            ) from error
+        start = point_of(run.state.system, run.state.x)
+        for name, (low, high) in run.settings.limits.items():
+            slack = _SLACK * max(abs(low), abs(high), high - low)
+            if not low - slack <= start[name] <= high + slack:
+                here, *ends = (f"{self.scene.factor(name) * value:.10g}" for value in (start[name], low, high))
+                words, unit = " to ".join(ends), f" {self.scene.unit(name)}".rstrip()
+                first = "stage 1: " if self.number == 1 else ""  # later ones are named by the caller
+                where = f"limits: {name} = {here}{unit} at the start of the stage is outside its limits, {words}{unit}"
+                raise ConfigError(f"{first}{where}; widen them, or start at another point")
+        return run
+
+    def _begun(self, origin: Point) -> Continuation:
+        """Return the run of a stage from a point."""
+        stage, strip = self.stage, self.strip
+        changed = origin.system.problem is not strip.problem or bool(stage.numbers)
+        if stage.start_at is not None and stage.start_at.startswith("BP"):
+            return Continuation(origin.system, origin.x, *self._switched(origin, changed))
+        if not changed:
+            system, x = origin.system.with_free((stage.follow, *strip.problem.multipliers), origin.x)
+            return Continuation(system, x, self._settings(system, x))
+        numbers = {name: value / self.scene.factor(name) for name, value in stage.numbers.items()}
+        try:
+            system, x = with_ends(strip, origin, stage.follow, numbers)
+            return Continuation(system, x, self._settings(system, x))
+        except ValueError as error:
+            raise ConfigError(f"start, finish: {error}") from error
+        except ConvergenceError as error:
+            given = ", ".join(f"{name} = {exact_text(value)}" for name, value in stage.numbers.items())
+            where = f"near the one before{f' with {given}' if given else ' with these ends'}"
+            raise ConfigError(f"numbers: no state was found {where}; follow the changes in stages") from error
+        except ContinError as error:
+            raise ConfigError(f"numbers: {error}") from error
+
+    def _switched(self, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:
+        """Return the settings and the first tangent of a stage that leaves a branch point.
+
+        Raises
+        ------
+        ConfigError
+            No single branch leaves it, or not in this stage.
+        """
+        stage = self.stage
+        if not origin.is_simple_branch_point:
+            raise ConfigError(
+                f"start_at: {stage.start_at!r}: {origin.nullity} modes are neutral there, and no single branch leaves it; a "
+                "phase or an imperfection tells the modes apart"
+            )
+        if changed:
+            raise ConfigError(
+                f"start_at: {stage.start_at!r}: a branch point is left with the ends and the numbers that led to it"
+            )
+        if origin.system.free[0] != stage.follow:
+            raise ConfigError(
+                f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {origin.system.free[0]}"
+            )
+        way = 1 if stage.way == "forward" else -1
+        settings = dataclasses.replace(self._settings(origin.system, origin.x), direction=way)
+        return settings, way * origin.details.tangents[1]
+
+    def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
+        """Return the settings of a stage that starts at a state."""
+        stage, steps = self.stage, self.scene.steps
+        here = system.parameter(x, stage.follow)
+        to = stage.to / self.scene.factor(stage.follow)
+        reach = abs(to - here) or 1.0
+        limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
+        limits |= {name: tuple(end / self.scene.factor(name) for end in ends) for name, ends in stage.limits.items()}
+        zeros = {name: [value / self.scene.factor(name) for value in values] for name, values in stage.label.items()}
+        return Settings(
+            primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
+            max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
+            zeros=zeros, mesh=_mesh_control(self.scene), events=self.strip.domain_tests(),
+            scales=self.strip.sizes(system, x),
+        )  # fmt: skip
+
+    # --- columns --------------------------------------------------------------------------------------------------------
+
+    @functools.cache  # noqa: B019 - a stage lives as long as its run
+    def columns(self) -> Columns:
+        """Return the columns of all stages together: each has the numbers of every stage."""
+        problems = [self.scene.strip(number).problem for number in range(1, len(self.scene.stages) + 1)]
+        hidden = {name for problem in problems for name in problem.multipliers}
+        numbers = dict.fromkeys(name for problem in problems for name in problem.parameters if name not in hidden)
+        found = dict.fromkeys(name for problem in problems for name in problem.functionals if name not in numbers)
+        followed = {stage.follow for stage in self.scene.stages}
+        columns = [_column(name, error_of(name) if name in followed else None) for name in numbers]
+        columns += [_column(name, error_of(name), role=FOUND) for name in found]
+        columns.append(Column("stage", "stage of the scene, from 1", lambda row: row.stage.number, None, "i4", BOOK))
+        own = ("potential", *REACTIONS, *(("F_roller",) if self.scene.roller else ()))
+        return Columns((*columns, *(_column(name, error_of(name), role=FOUND) for name in own)), True)
+
+    def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
+        """Loads that do not act are zero; angles that are not prescribed are those of the last end."""
+        states = point.system.states(point.x)
+        found = {**point.parameters, **point.functionals, **self._found(point, states)}
+        absent = {name: 0.0 for name in names if name not in found}
+        if set(ANGLES) & set(absent):
+            absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
+        return absent | found
+
+    def errors(self, point: Point) -> Mapping[str, float]:
+        found = errors_of(point, lambda at: {**at.functionals, **self._found(at, at.system.states(at.x))})
+        return found | point.errors
+
+    def _found(self, point: Point, states: np.ndarray) -> dict[str, float]:
+        """Return the potential and the reactions."""
+        return {"potential": self.strip.potential(point), **self.strip.reactions_of(states)}
+
+    # --- words ----------------------------------------------------------------------------------------------------------
+
+    def row(self, point: Point, step: float) -> str:
+        factor, stiffness = self.scene.factor, self.strip.section.stiffness
+        self._largest = max(self._largest, abs(point[self.follow] * factor(self.follow)))
+        force, energy = (
+            without_round_off(found, stiffness) * factor(name)
+            for name, found in (("F_tangent", self.strip.reactions(point)["F_tangent"]), ("energy", point["energy"]))
+        )
+        value = without_round_off(point[self.follow] * factor(self.follow), self._largest)
+        return (
+            f"{value:14.8g}  {energy:12.6g}  {force:12.6g}"
+            f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
+        )
+
+    def describe(self, event: Any, largest: float) -> str:
+        name, factor = self.follow, self.scene.factor(self.follow)
+        label, error = event["label"].decode(), event[f"error_{name}"] * factor
+        shown = dict.fromkeys(("energy", CONJUGATE.get(name, "energy")))  # and what is conjugate to the followed number
+        others = "".join(f", {text}" for text in (self._with_error(event, column) for column in shown) if text)
+        found = f" (± {error:.0e})" if label in ("LP", "BP") and not math.isnan(error) else ""
+        place = f"{name} = {_rounded(without_round_off(event[name], largest) * factor, error)}{found}"
+        what = event["name"].decode()
+        change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
+        broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
+        told = what if "=" not in what and (label not in ("LP", "BP") or "kernel" in what) else ""  # not the value once more
+        kind = f" ({told})" if told else ""
+        return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
+
+    def _with_error(self, event: Any, column: str) -> str:
+        """Return a column of a labelled point with its error, '' where it has none."""
+        if f"error_{column}" not in event.dtype.names or math.isnan(event[f"error_{column}"]):
+            return ""
+        value, error = (event[field] * self.scene.factor(column) for field in (column, f"error_{column}"))
+        unit = self.scene.unit(column)
+        return f"{column} = {_rounded(value, error)}{f' {unit}' if unit else ''} (± {error:.0e})"
+
+
+def _rounded(value: float, error: float) -> str:
+    """Return a number with ten digits; 0 where it is smaller than its error."""
+    return "0" if abs(value) < error else f"{value:.10g}"
+
+
+def _column(name: str, error, role: str = NUMBER) -> Column:
+    words, axis = _WORDS.get(name, (name, name))
+    return Column(name, words, error=error, role=role, axis=axis)
+
+
+# --- the first state --------------------------------------------------------------------------------------------------
+
+
+def first_state(scene: OpenScene) -> Point:
+    """Return the state from which the first stage starts.
+
+    Raises
+    ------
+    ConfigError
+        It was not found, or nothing determines it.
+    """
+    strip, mesh = scene.strip(), scene.mesh
+    turn = strip.parameters.get("turn", 0.0)
+    half_twists = turn / math.pi
+    guesses = {
+        "natural": lambda: None, "arch": lambda: strip.arch(), "arch, other side": lambda: strip.arch(side=-1.0),
+        "circle": lambda: strip.twisted_circle(half_twists), "twisted": lambda: strip.twisted(turn),
+    }  # fmt: skip
+    try:
+        guess, values, intervals = guesses[scene.begin](), None, mesh.intervals
+        if strip.roller is not None:
+            intervals = strip.roller.intervals(mesh.intervals)
+            if guess is not None and "roller" not in scene.numbers:  # it touches the strip where it is
+                values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
+        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene))
+    except (ProblemError, ValueError) as error:
+        raise ConfigError(f"begin: {scene.begin}: {error}") from error
+
+
+def _mesh_control(scene: OpenScene) -> MeshControl:
+    mesh = scene.mesh
+    every = 0 if scene.roller else mesh.adapt_every  # a mesh point stays at the roller
+    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, every)

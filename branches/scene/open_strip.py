@@ -1,0 +1,420 @@
+"""Scenes of open strips: material, ends, loads, and stages that are followed one after the other; checked field by field.
+
+A scene with ``stages`` is one. With ``dimensions`` (SI units) its numbers are in m, rad, N, N m and N/m; without, in units of
+the length of the strip and its bending modulus (`ribbon_model.section`).
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from branches.scene.fields import Interval, MeshConfig, StepConfig, Strict, show
+from branches.scene.scene import Scene
+from branches.scene.units import STRIP_UNITS, quantity
+from contin.lowlevel import exact_text
+from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
+from ribbon_model.plate import RIGIDITIES
+from ribbon_model.section import Section, section_of
+
+#: Ends in one word or two.
+_WORDS: dict[str, dict] = {
+    "clamped": {}, "hinged": {"rotation": HINGED, "about": "width"}, "ball joint": {"rotation": "free"},
+    "free": {"rotation": "free", "place": "free"},
+}  # fmt: skip
+#: What a number is measured in: the power of the length, the power of the modulus B, and the name of the unit.
+_UNITS = {
+    **dict.fromkeys((*PLACE, "stroke", "roller"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
+    **dict.fromkeys(("force_width", "force_normal", "force_tangent"), (-2, 1, "N")), "moment": (-1, 1, "N m"),
+    "weight": (-3, 1, "N/m"), "foundation": (-4, 1, "N/m^2"), **dict.fromkeys(("kappa_n", "kappa_2", "tau_n"), (-1, 0, "1/m")),
+    **dict.fromkeys(("energy", "potential"), (-1, 1, "J")),
+}  # fmt: skip
+#: Laws of a strip with dimensions; the first one if none is given.
+_OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
+
+Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value))]
+
+
+def _direction(value: Any) -> tuple[float, float, float]:
+    if isinstance(value, str) and value in DIRECTIONS:
+        return DIRECTIONS[value]
+    if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
+        raise ValueError(f"must be {', '.join(DIRECTIONS)} or three numbers, not {value!r}")
+    return unit("direction", value)
+
+
+class EndConfig(Strict):
+    """What is held at an end."""
+
+    rotation: Literal["clamped", "hinged", "joint", "free"] = "clamped"
+    about: Direction | None = Field(None, description="axis of a hinge, or the axis of a joint that is fixed in space")
+    perpendicular: Literal["width", "normal", "tangent"] | None = Field(
+        None, description="direction of the strip that a joint keeps perpendicular to its axis"
+    )
+    place: Literal["held", "free"] = "held"
+    slides_along: Direction | None = None
+    slides_in_plane: Direction | None = Field(None, description="the normal of the plane")
+
+    @model_validator(mode="after")
+    def _fits(self):
+        slides = [value for value in (self.slides_along, self.slides_in_plane) if value is not None]
+        if len(slides) > 1 or (slides and self.place == "free"):
+            raise ValueError("place, slides_along, slides_in_plane: give one of them")
+        if (self.about is None) != (self.rotation in ("clamped", "free")):
+            raise ValueError(_belongs("about", "hinged or joint", self.about, self.rotation))
+        if (self.perpendicular is None) != (self.rotation != JOINT):
+            raise ValueError(_belongs("perpendicular", "joint", self.perpendicular, self.rotation))
+        self.end()
+        return self
+
+    def end(self) -> End:
+        """Return the end."""
+        held = tuple(DIRECTIONS.values()) if self.place == "held" else ()
+        if self.slides_along is not None:
+            held = perpendicular(self.slides_along)
+        if self.slides_in_plane is not None:
+            held = (self.slides_in_plane,)
+        director = list(DIRECTIONS).index(self.perpendicular) if self.perpendicular else 0
+        return End(self.rotation, self.about or DIRECTIONS["width"], director, held)
+
+
+def _belongs(field: str, rotations: str, value: Any, rotation: str) -> str:
+    """Return what is wrong with a field that is missing, or that this rotation does not have."""
+    if value is None:
+        return f"{field}: is missing; the rotation {rotation!r} needs it"
+    return f"{field}: belongs to the rotation {rotations}, not to {rotation!r}"
+
+
+def _end(value: Any) -> Any:
+    if isinstance(value, str) and value not in _WORDS:
+        raise ValueError(f"{value!r} must be {', '.join(_WORDS)}, or fields such as rotation and slides_along")
+    return _WORDS[value] if isinstance(value, str) else value
+
+
+EndWords = Annotated[EndConfig, BeforeValidator(_end)]
+
+
+class ClosedConfig(Strict):
+    """A strip whose ends are joined."""
+
+    half_twists: int = Field(0, ge=-20, le=20, description="half twists between the ends before they are joined")
+
+
+class DirectionsConfig(Strict):
+    """Where loads and displacements point to."""
+
+    weight: Direction = (0.0, -1.0, 0.0)
+    foundation: Direction = DIRECTIONS["normal"]
+    stroke: Direction = DIRECTIONS["tangent"]
+
+
+class RollerConfig(Strict):
+    """A support between the ends."""
+
+    at: float = Field(gt=0, lt=1, description="where along the strip, over its length")
+    held: Direction = Field(DIRECTIONS["normal"], description="direction in which the place is held")
+
+
+class DimensionsConfig(Strict):
+    """A strip, in SI units or with units."""
+
+    width: float = Field(gt=0)
+    thickness: float = Field(gt=0)
+    length: float = Field(gt=0)
+    poisson_ratio: float = Field(gt=-1, le=0.5)
+    youngs_modulus: float = Field(gt=0)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si_units(cls, value, info):
+        return quantity(value, STRIP_UNITS[info.field_name]) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _thin(self):
+        if not self.thickness < self.width < self.length:
+            raise ValueError("width must lie between thickness and length")
+        return self
+
+    @property
+    def modulus(self) -> float:
+        """B in N m**2: that of the plate times the width."""
+        return self.youngs_modulus * self.thickness**3 * self.width / (12 * (1 - self.poisson_ratio**2))
+
+
+class StageConfig(Strict):
+    """One stage: a number that is followed from a labelled point to a value; from there on, the ends may be held otherwise."""
+
+    follow: str = Field(description="the number that is followed")
+    to: float = Field(description="the value at which the stage ends")
+    start_at: str | None = Field(None, description="labelled point to start from, as in BP 2 (the end of the stage before)")
+    stage: int | None = Field(None, ge=1, description="number of the stage of that point (the one before)")
+    way: Literal["forward", "backward"] = Field("forward", description="which of the two ways away from a branch point")
+    start: EndWords | None = Field(None, description="what is held at the first end from here on (as before)")
+    finish: EndWords | None = Field(None, description="what is held at the last end from here on (as before)")
+    numbers: dict[str, float] = Field(default_factory=dict, description="numbers that the stage begins with (as before)")
+    max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
+    limits: dict[str, Interval] = Field(default_factory=dict)
+    label: dict[str, Annotated[list[float], Field(max_length=100)]] = Field(
+        default_factory=dict, description="values at which points are labelled UZ"
+    )
+
+    @model_validator(mode="after")
+    def _point(self):
+        if self.start_at is not None and not re.fullmatch(r"(EP|BP|LP|UZ)( [1-9][0-9]{0,2})?", self.start_at):
+            raise ValueError(f"start_at: {self.start_at!r} must be a label with a number, as in BP 1, LP 2, UZ 1")
+        return self
+
+    def place_among(self, labelled: Sequence[tuple[str, str]]) -> int | None:
+        """Return which of the labelled points (label, name) of a stage this one starts from; None if there is none."""
+        if self.start_at is None:
+            return len(labelled) - 1
+        label, _, count = self.start_at.partition(" ")
+        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != "start"]
+        return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
+
+
+def _expression(value: Any) -> Any:
+    """Return data along the strip as an expression: a table is the polynomial through its points (Newton's form)."""
+    if not isinstance(value, list):
+        return value
+    pairs = all(isinstance(pair, list) and len(pair) == 2 and all(type(x) in (int, float) for x in pair) for pair in value)
+    if not (pairs and 2 <= len(value) <= 12):
+        raise ValueError(f"a table must have 2 to 12 points [s, value], not {show(value)}")
+    s, y = ([float(pair[i]) for pair in value] for i in (0, 1))
+    if s != sorted(set(s)) or s[0] != 0 or s[-1] != 1:
+        raise ValueError("the places s of a table must increase from 0 to 1")
+    differences = list(y)
+    for order in range(1, len(s)):
+        for i in reversed(range(order, len(s))):
+            differences[i] = (differences[i] - differences[i - 1]) / (s[i] - s[i - order])
+    text = repr(differences[-1])
+    for i in reversed(range(len(s) - 1)):
+        text = f"({differences[i]!r}) + (s - {s[i]!r}) * ({text})"
+    return text
+
+
+class OpenMesh(MeshConfig):
+    """Fields of the mesh."""
+
+    degree: int = Field(7, ge=2, le=8)
+    intervals: int = Field(10, ge=1, le=2000)
+    tolerance: float = Field(1e-9, ge=1e-14, le=1e-2)
+
+
+class OpenScene(Scene):
+    """An open strip (or a closed, twisted one), and the stages in which its numbers are followed."""
+
+    KIND: ClassVar[str] = "open strip"
+    LISTS: ClassVar[tuple] = (
+        *((part, "*") for part in ("material", "dimensions", "numbers", "closed")), ("roller", "at"),
+        ("stages", "#", "to"), ("stages", "#", "numbers", "*"),
+    )  # fmt: skip
+
+    title: str = ""
+    material: dict[str, float | int | str] = Field(description="law, and its numbers")
+    dimensions: DimensionsConfig | None = None
+    along: dict[str, Annotated[str, BeforeValidator(_expression)]] = Field(
+        default_factory=dict, description="data along the strip: expressions in s, or tables of [s, value]"
+    )
+    start: EndWords = EndConfig()
+    finish: EndWords = EndConfig()
+    closed: ClosedConfig | None = None
+    roller: RollerConfig | None = None
+    numbers: dict[str, float] = Field(default_factory=dict)
+    directions: DirectionsConfig = DirectionsConfig()
+    begin: Literal["natural", "arch", "arch, other side", "twisted", "circle"] = "natural"
+    phases: list[Literal["spin", "shift, right", "shift, left", "shift, two waves"]] = Field(default_factory=list, max_length=2)
+    stages: list[StageConfig] = Field(min_length=1, max_length=50)
+    mesh: OpenMesh = OpenMesh()
+    steps: StepConfig = StepConfig()
+    stride: int = Field(1, ge=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _infinite(cls, values: Any) -> Any:
+        """Let B2 be infinite, which other numbers must not be."""
+        material = values.get("material") if isinstance(values, dict) else None
+        if isinstance(material, dict) and material.get("B2") == math.inf:
+            return {**values, "material": {**material, "B2": "inf"}}
+        return values
+
+    @model_validator(mode="after")
+    def _fits(self):
+        if self.closed is not None and (self.start, self.finish) != (EndConfig(), EndConfig()):
+            raise ValueError("closed: must not be given together with start or finish")
+        for number, stage in enumerate(self.stages, 1):
+            if stage.stage is not None and stage.stage >= number:
+                raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
+            if number == 1 and (stage.start or stage.finish or stage.numbers):
+                raise ValueError("stage 1: start, finish, numbers: those of the scene are the first stage's")
+            strip = self.strip(number)
+            if stage.follow not in strip.parameters:
+                followed = ", ".join(strip.parameters)
+                raise ValueError(f"stage {number}: follow: {stage.follow!r} must be one of the numbers here: {followed}")
+            if number == 1 and (stage.start_at or stage.stage):
+                raise ValueError("stage 1: start_at: the first stage starts from the first state")
+            for name in stage.numbers:
+                if name not in strip.parameters:
+                    raise ValueError(f"stage {number}: numbers: {name!r} must be one of {', '.join(strip.parameters)}")
+            for name in (*stage.limits, *stage.label):
+                if name not in (*strip.parameters, *PLACE, "energy"):
+                    known = ", ".join(dict.fromkeys((*strip.parameters, *PLACE, "energy")))
+                    raise ValueError(f"stage {number}: {name!r} must be one of the columns {known}")
+        return self
+
+    # --- the strip ----------------------------------------------------------------------------------------------------
+
+    def factor(self, name: str) -> float:
+        """Return what a number of the strip is multiplied by to have its unit."""
+        if self.dimensions is None:
+            return 1.0
+        length, modulus, _ = _unit_of(name)
+        return self.dimensions.length**length * self.modulus**modulus
+
+    @property
+    def modulus(self) -> float:
+        """The bending modulus that is 1 in the law, in N m^2; 1 without dimensions."""
+        if self.dimensions is None:
+            return 1.0
+        narrow = 1 - self.dimensions.poisson_ratio**2 if self.material.get("law") == FLAT_ROD.name else 1.0
+        return self.dimensions.modulus * narrow  # a narrow strip is free to bend across: E h^3 w/12
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a number, '' without dimensions."""
+        return _unit_of(name)[2] if self.dimensions is not None else ""
+
+    def _material(self) -> Section:
+        values = dict(self.material)
+        law = values.pop("law", None)
+        if self.dimensions is not None:
+            d = self.dimensions
+            given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
+            if given:
+                raise ValueError(f"material: {given[0]} must not be given together with dimensions")
+            law = FINITE_WIDTH.name if law is None else law
+            if law not in _OF_DIMENSIONS:
+                raise ValueError(f"material: law: {law!r} must be one of {', '.join(_OF_DIMENSIONS)} together with dimensions")
+            values["nu"] = d.poisson_ratio
+            if law == FINITE_WIDTH.name:
+                values["Gamma"] = d.width**2 / (d.thickness * d.length)
+        if law is None:
+            raise ValueError("material: the field 'law' is missing")
+        numbers = {}
+        for name, value in values.items():
+            if isinstance(value, str) and not (name == "B2" and value == "inf"):
+                raise ValueError(f"material: {name}: must be a number, not {value!r}")
+            if not name.isidentifier():
+                raise ValueError(f"material: {name!r} is not usable as a name")
+            numbers[name] = math.inf if isinstance(value, str) else value / self.factor(name)
+        return section_of(str(law), numbers, self.along)
+
+    @functools.cached_property
+    def _strips(self):
+        """The strips of all stages by what is held: first end, last end, and whether reactions have become loads."""
+        return {}
+
+    def _held(self, stage: int) -> tuple[EndConfig, EndConfig, bool]:
+        """Return what is held in a stage, and whether that has changed since the first one."""
+        if stage == 1:
+            return self.start, self.finish, False
+        one = self.stages[stage - 1]
+        start, finish, changed = self._held(one.stage or stage - 1)
+        return one.start or start, one.finish or finish, changed or bool(one.start or one.finish)
+
+    def strip(self, stage: int = 1):
+        """Return the `ribbon_model.open_strip.OpenStrip` of a stage, from 1.
+
+        Raises
+        ------
+        ValueError
+            Fields that do not fit; one sentence.
+        """
+        held = self._held(stage)
+        if held not in self._strips:
+            try:
+                self._strips[held] = self._strip_with(*held)
+            except ValueError as error:
+                raise ValueError(f"stage {stage}: {error}" if held[2] else str(error)) from error
+        return self._strips[held]
+
+    def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
+        """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
+        from ribbon_model.integral_conditions import Roller
+        from ribbon_model.loads import LOADS, STROKE, replacing_loads
+        from ribbon_model.open_strip import OpenStrip
+
+        ends, where = (start.end(), finish.end()), self.directions
+        directions, material = (where.weight, where.foundation, where.stroke), self._material()
+        replacing = replacing_loads(ends[1])
+        unknown = {"moment"} - set(replacing)
+        more = (tuple(self.phases), Roller(self.roller.at, self.roller.held) if self.roller else None)
+        known = set(OpenStrip(material, *ends, {}, *directions, *more).known) - unknown
+        numbers = {name: value / self.factor(name) for name, value in self.numbers.items()}
+        if self.closed is not None:
+            numbers = {**dict.fromkeys((*PLACE, *ANGLES), 0.0), "turn": math.pi * self.closed.half_twists, **numbers}
+        if changed:
+            numbers = dict.fromkeys(replacing, 0.0) | {name: value for name, value in numbers.items() if name in known}
+        for name in itertools.chain.from_iterable((stage.follow, *stage.numbers) for stage in self.stages):
+            if name in (STROKE, *LOADS) and name in known:
+                numbers.setdefault(name, 0.0)
+        return OpenStrip(material, *ends, numbers, *directions, *more)
+
+    @property
+    def stage_count(self) -> int:
+        return len(self.stages)
+
+    def up_to(self, count: int) -> Scene:
+        return self.model_copy(update={"stages": self.stages[:count]})
+
+    def file_of(self, numbers: dict[str, Any]) -> str:
+        return "_".join(f"{name}{_text(value)}".replace(" ", "_") for name, value in numbers.items()) + ".h5"
+
+    @classmethod
+    def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
+        return ", ".join(f"{name} = {_text(value)}" for name, value in numbers.items())
+
+    def words(self, numbers: dict[str, Any]) -> str:
+        return self.words_of({}, numbers)
+
+    @property
+    def law_name(self) -> str:
+        return self.strip().section.law.name
+
+    @property
+    def heading(self) -> str:
+        return self.title or self.name
+
+    title_or_name = heading
+
+    @property
+    def name(self) -> str:
+        """The strip in words."""
+        law = self.strip().section.law.name
+        if self.closed is not None:
+            twists = self.closed.half_twists
+            return f"{law}, closed with {twists} half twist{'s' * (abs(twists) != 1)}"
+        return f"{law}, {self.strip().start.words} and {self.strip().finish.words}"
+
+    def value(self, name: str, number: float) -> str:
+        """Return a number with its unit, as text."""
+        return f"{exact_text(number)} {self.unit(name)}".strip()
+
+
+def _text(value: Any) -> str:
+    return exact_text(value) if type(value) in (int, float) else str(value)
+
+
+def _unit_of(name: str) -> tuple[int, int, str]:
+    if name in _UNITS:
+        return _UNITS[name]
+    base = name.removeprefix("start_")
+    if base.startswith("F_"):
+        return _UNITS["force_width"]
+    return _UNITS["moment"] if base.startswith("M_") else (0, 0, "")

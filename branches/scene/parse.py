@@ -1,0 +1,197 @@
+"""Scenes from files and texts: the one parser, the one way in which a mistake is told, and the one text of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from branches.scene.closed import ClosedScene
+from branches.scene.fields import ConfigError, show
+from branches.scene.scene import Scene
+from branches.scene.sweep import Sweep, combinations, lists_in
+from branches.scene.text import plain, read, written
+
+#: Largest number of branches in one scene. With ten times more, a mistyped list would run for hours.
+_MOST_BRANCHES = 10_000
+#: Largest size of a scene. Scenes have a few lines; a larger file is not a scene (or is a device that never ends).
+_MOST_BYTES = 1_000_000
+
+
+def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
+    """Return the scene of a YAML file, changed by ``key=value`` settings (dotted keys, YAML values).
+
+    Raises
+    ------
+    ConfigError
+        A file that cannot be read, or a field that is unknown, of the wrong type or invalid.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+        text = data.decode("utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"cannot read the config {str(path)!r}: it is not UTF-8 text") from error
+    if len(data) > _MOST_BYTES:
+        raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte; a scene must be smaller")
+    return parse(text, plain(str(path)), settings)
+
+
+def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
+    """Return the scene of a YAML text, or the sweep of one with lists; messages call the text ``name``."""
+    values = read(text, name)
+    if not isinstance(values, dict):
+        found = "it is empty" if values is None else f"not {show(values)}"
+        raise ConfigError(f"{name}: must hold `key: value` lines; {found}")
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        parts = key.strip().split(".")
+        if not equals or "" in parts:
+            raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
+        _put(values, parts, read(value, f"--set {plain(key)}"))
+    kind: type[Scene] = ClosedScene
+    if "stages" in values:
+        from branches.scene.open_strip import OpenScene as kind  # 0.15 s, which closed strips do not need
+    try:
+        values = kind.prepared(values)
+        lists = lists_in(values, kind.LISTS)
+        if lists or "pairs" in values and kind.PAIRS:
+            return _sweep(kind, values, lists, name, settings)
+    except ValueError as error:
+        raise ConfigError(f"{name}: {error}") from error
+    return _validated(kind, values, name, settings)
+
+
+def _validated(kind: type[Scene], values: dict, name: str, settings: Sequence[str]) -> Scene:
+    """Return the scene with these values; raise ConfigError with one sentence."""
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, kind)}") from error
+
+
+def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str, settings: Sequence[str]) -> Sweep:
+    """Return the scenes of all combinations of the lists' values.
+
+    Raises
+    ------
+    ValueError, ConfigError
+        A field that is invalid in every combination, or a combination that is given twice.
+    """
+    for place, entries in lists.items():
+        if not entries or any(isinstance(entry, (list, dict)) for entry in entries):
+            empty = "" if entries else ": the list is empty"
+            raise ValueError(f"{'.'.join(map(str, place))}: must be a number, or a list of numbers, not {show(entries)}{empty}")
+    axes = kind.axes(values, lists)
+    count = math.prod(len(entries) for _, entries in axes)
+    if count > _MOST_BRANCHES:
+        raise ValueError(f"{count} branches are more than {_MOST_BRANCHES}")
+    scenes: dict[str, Scene] = {}
+    numbers, absent = {}, {}
+    for chosen, whole in combinations(values, axes):
+        fields = kind.combination(whole, lists)
+        if fields is None:
+            continue
+        words = kind.words_of(fields, chosen)
+        try:
+            one = kind.model_validate(fields)
+        except ValidationError as error:
+            if error.errors()[0]["loc"]:
+                raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, kind)}") from error
+            absent[words] = _sentence(error, kind)
+            continue
+        file = one.file_of(chosen)
+        if file in scenes:
+            raise ValueError(kind.same_name(words, scenes[file], one))
+        scenes[file], numbers[file] = one, chosen
+    if not scenes:
+        reason = next(iter(absent.values()), "n = m is a rigid rotation")
+        raise ValueError(f"none of its branches can be run ({reason})")
+    return Sweep(str(values.get("title", "")), values, scenes, numbers, absent)
+
+
+def dump(scene: Scene | Sweep) -> str:
+    """Return the YAML text of a scene without fields at their defaults; `parse` reads it back."""
+    return written(scene.fields())
+
+
+def difference(stored: Scene, scene: Scene, ignored: Sequence[str] = ()) -> str:
+    """Return the first field in which the scene of a file differs from another scene, in words; '' if they agree.
+
+    Parameters
+    ----------
+    ignored : sequence of str
+        Fields that may differ: ``title``, or ``steps.max_points`` for one inside another.
+    """
+    if stored.KIND != scene.KIND:
+        return f"a {stored.KIND} there, a {scene.KIND} here"
+    a, b = stored.model_dump(), scene.model_dump()
+    for field in ignored:
+        name, _, inner = field.partition(".")
+        for values in (a, b):
+            (values[name] if inner else values).pop(inner or name, None)
+    for name in a:
+        if a[name] != b[name]:
+            return f"{name} = {a[name]!r} there, {b[name]!r} here"
+    return ""
+
+
+def _put(values: dict, path: list[str], value: Any) -> None:
+    for part in path[:-1]:
+        values = values.setdefault(part, {})
+        if not isinstance(values, dict):
+            raise ConfigError(f"--set {plain('.'.join(path))}: {part!r} has no fields")
+    values[path[-1]] = value
+
+
+# --- messages -----------------------------------------------------------------------------------------------------
+
+
+def _where(complaint) -> str:
+    return plain(".".join(str(part) for part in complaint["loc"] if part != "[key]"))
+
+
+def _origin(error: ValidationError, name: str, settings: Sequence[str]) -> str:
+    """Return the setting that the first error is about, otherwise the file."""
+    where = _where(error.errors()[0])
+    for setting in reversed(settings):
+        key = setting.partition("=")[0].strip()
+        if f"{where}.".startswith(f"{key}.") or f"{key}.".startswith(f"{where}."):
+            return f"--set {plain(setting)}"
+    return name
+
+
+def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
+    """Return the first error as `field: value ... what is allowed`, and the number of further errors."""
+    errors = error.errors()
+    first = errors[0]
+    where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")
+    if kind == "extra_forbidden":
+        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc'], model))}"
+    elif kind == "missing":
+        text = f"the field {where!r} is missing"
+    elif kind == "value_error":
+        text = f"{where}: {message}" if where else message
+    elif kind in ("model_type", "dict_type"):
+        text = f"{where}: must hold `key: value` fields, not {show(first['input'])}"
+    else:
+        message = message.replace("Input should be", "must be")
+        text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
+    return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
+
+
+def _fields(location, model: type[BaseModel]) -> list[str]:
+    for part in location[:-1]:
+        field = model.model_fields.get(part)
+        inner = [kind for kind in (field.annotation, *get_args(field.annotation)) if _is_model(kind)] if field else []
+        model = inner[0] if inner else model
+    return list(model.model_fields)
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

@@ -1,0 +1,321 @@
+"""A result file in memory: the scene, the tables, the kept solutions; pieces, places and axes of all kinds of strips."""
+
+from __future__ import annotations
+
+import functools
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from branches.scene.columns import Columns
+from branches.scene.labels import SPECIAL, Label, label_of
+from branches.scene.parse import dump
+from branches.scene.scene import Scene
+from branches.scene.stages import stages_of
+from branches.store.files import StoreError
+
+if TYPE_CHECKING:  # the mechanics of a kind of strip are imported with its stages
+    from branches.scene.stage import Stage
+    from ribbon_model.shape import Shape
+
+#: So many labelled points are shown at a prompt, a line each: a screen has 24 lines.
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of a stage between special points: rows of the table of points, and whether it is stable (None: not known)."""
+
+    stage: int
+    rows: np.ndarray
+    stable: bool | None
+
+
+@dataclass(frozen=True)
+class Snap:
+    """A fold at which a stable piece ends: its row, the place (column, value) where it snaps to, and the energy released."""
+
+    row: int
+    column: str
+    value: float
+    to: dict[str, float]
+    released: float
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A labelled point in a picture: its row, its label, whether the branch goes on there, its word in the legend."""
+
+    row: int
+    label: Label
+    open: bool
+    word: str | None
+
+
+@dataclass(frozen=True, repr=False)
+class StoredBranch(ABC):
+    """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
+
+    ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...). ``notes``
+    are those of `contin.Branch`.
+    """
+
+    scene: Scene
+    status: str
+    stop: str
+    reason: str
+    points: np.ndarray
+    events: np.ndarray
+    index: np.ndarray
+    t: np.ndarray
+    states: np.ndarray
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        lines = [f"{type(self).__name__}({self.about}: {len(self.points)} points, {self.status}; {self.stop or 'not ended'})"]
+        for row, event in enumerate(self.events[:_SHOWN]):
+            label, name = event["label"].decode(), event["name"].decode()
+            lines.append(f"  point {event['point']:5d}  {label}  {self.place(row)}{f': {name}' if name else ''}")
+        more = len(self.events) - _SHOWN
+        return "\n".join([*lines, *([f"  ... {more} more in events"] if more > 0 else [])])
+
+    # --- the scene ------------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def config(self) -> dict:
+        """The fields of the scene."""
+        return self.scene.model_dump()
+
+    def scene_text(self) -> str:
+        """Return the scene as YAML."""
+        return dump(self.scene)
+
+    @functools.cached_property
+    def stages(self) -> list[Stage]:
+        """The stages of the scene."""
+        return stages_of(self.scene)
+
+    @functools.cached_property
+    def columns(self) -> Columns:
+        """The columns of the scene; a file of another version may lack some."""
+        return self.stages[0].columns()
+
+    @property
+    @abstractmethod
+    def about(self) -> str:
+        """The branch in words."""
+
+    @property
+    @abstractmethod
+    def shown(self) -> tuple[str, ...]:
+        """Columns of labelled points that a notebook shows."""
+
+    # --- points ---------------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def stage_of(self) -> np.ndarray:
+        """The stage of each point, from 1."""
+        return self.points["stage"] if "stage" in self.points.dtype.names else np.ones(len(self.points), int)
+
+    @functools.cached_property
+    def way(self) -> np.ndarray:
+        """The arclength of each point, that of all stages in a row."""
+        s, offset = self.points["arclength"].copy(), 0.0
+        for stage in np.unique(self.stage_of):
+            s[self.stage_of == stage] += offset
+            offset = s[self.stage_of == stage][-1]
+        return s
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column of the table of points, or one that follows from others.
+
+        Raises
+        ------
+        StoreError
+            There is none.
+        """
+        if name in self.points.dtype.names and self.points.dtype[name].kind in "if":
+            return self.points[name]
+        known = self.columns.all.get(name)
+        if known is None or known.derived is None:
+            there = [*self.columns.shown(), *(one.name for one in self.columns.all.values() if one.derived)]
+            raise StoreError(f"there is no column {name!r} of numbers; there are {', '.join(there)}")
+        return known.derived(self.points)
+
+    @abstractmethod
+    def place(self, row: int) -> str:
+        """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
+
+    def followed(self, stage: int) -> str:
+        """Return the number that a stage follows."""
+        return self.stages[stage - 1].follow
+
+    def conjugate(self, name: str) -> str:
+        """Return the column that is shown where a number is followed."""
+        return next((stage.conjugate for stage in self.stages if stage.follow == name), "energy")
+
+    def pieces(self) -> list[Piece]:
+        """Return the parts of all stages between special points."""
+        found = []
+        special = {int(event["point"]) for event in self.events if event["label"].decode() in SPECIAL}
+        for stage in np.unique(self.stage_of):
+            rows = np.flatnonzero(self.stage_of == stage)
+            for first, last in pairwise(sorted({rows[0], rows[-1], *(row for row in rows if row in special)})):
+                index = self.index_on(np.arange(first, last + 1))
+                found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
+        return found
+
+    def index_on(self, rows: np.ndarray) -> int:
+        """Return the index on a piece, that of its points which are not special; -1 if they differ or none is known."""
+        if "index" not in self.points.dtype.names:
+            return -1
+        inside = rows[1:-1] if len(rows) > 2 else rows
+        regular = [row for row in inside if self.points["label"][row] not in (b"LP", b"BP", b"SB")]
+        values = {value for value in self.points["index"][regular].tolist() if value >= 0}
+        return int(values.pop()) if len(values) == 1 else -1
+
+    def snaps(self) -> list[Snap]:
+        """Return the folds at which a stable piece ends, with the stable state below that the file has, if any."""
+        return []
+
+    # --- solutions ------------------------------------------------------------------------------------------------------
+
+    def kept(self) -> np.ndarray:
+        """Return the numbers of the points whose full solution is kept."""
+        return self.index["point"]
+
+    def states_at(self, point: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return places t (K,) and states (K, n) of a kept point.
+
+        Raises
+        ------
+        StoreError
+            The solution of this point is not kept.
+        """
+        row = self._kept(point)
+        here = slice(row["start"], row["start"] + row["count"])
+        return self.t[here], self.states[here]
+
+    def degree(self, point: int) -> int:
+        """Return the polynomial degree of the solution of a kept point."""
+        return int(self._kept(point)["degree"])
+
+    def _kept(self, point: int) -> np.void:
+        found = np.flatnonzero(self.index["point"] == point)
+        if not found.size:
+            raise StoreError(f"the solution of point {point} is not kept; a smaller stride keeps more")
+        return self.index[found[0]]
+
+    @abstractmethod
+    def solution(self, point: int) -> Any:
+        """Return the solution of a kept point of a closed strip; see `states_at` for its errors."""
+
+    @abstractmethod
+    def shape(self, point: int) -> Shape:
+        """Return the strip at a kept point."""
+
+    @abstractmethod
+    def placed(self, point: int, length: float, cells: int = 0) -> tuple[Shape, np.ndarray]:
+        """Return the strip of a point at a length, upright, and its strains (K, 3) in radians per unit of that length.
+
+        It has at least so many ``cells`` between nodes.
+        """
+
+    #: The length of `shape`.
+    shape_length: ClassVar[float] = 1.0
+
+    @property
+    @abstractmethod
+    def length(self) -> float:
+        """The length of the scene's strip; 1 without dimensions."""
+
+    @abstractmethod
+    def width_at(self, length: float, thickness: float | None) -> float | None:
+        """Return the width of the scene's strip at a length, or that from a thickness and the law's Gamma, or None."""
+
+    # --- pictures -------------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def caption(self) -> str:
+        """What a picture shows, in words."""
+
+    @functools.cached_property
+    def panels(self) -> list[tuple[str, str]]:
+        """The columns that pictures show against each other: each number that is followed, and what is conjugate to it."""
+        names = dict.fromkeys(self.followed(int(stage)) for stage in np.unique(self.stage_of))
+        return [(name, self.conjugate(name)) for name in names]
+
+    def axis(self, name: str) -> tuple[np.ndarray, str]:
+        """Return a column in its unit, and the words of its axis."""
+        column, unit = self.columns.all.get(name), self.scene.unit(name)
+        words = name if column is None else column.axis or name
+        return self.column(name) * self.scene.factor(name), f"{words} in {unit}" if unit else words
+
+    def words_of(self, name: str, value: float) -> str:
+        """Return a value of a column with three digits and its unit."""
+        return f"{value * self.scene.factor(name):.3g} {self.scene.unit(name)}".strip()
+
+    def marks(self) -> Iterator[Mark]:
+        """Yield the marks of labelled points."""
+        for event in self.events:
+            if event["name"] != b"start":
+                label = label_of(event["label"].decode())
+                yield Mark(int(event["point"]), label, event["label"] == b"EP", label.word)
+
+    @abstractmethod
+    def colour(self, stage: int) -> str:
+        """Return the colour of a stage."""
+
+    @abstractmethod
+    def posed(self, points: list[int]) -> dict[int, Shape]:
+        """Return the strips at kept points as pictures show them, all from one side."""
+
+    @abstractmethod
+    def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
+        """Return the width of drawn strips: the one asked for, or that of the scene; narrower where generators would cross."""
+
+    def plot(self, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None):
+        """Return the result as a matplotlib figure; see `branches.draw.picture.figure`."""
+        from branches.draw.picture import figure
+
+        return figure(self, shapes, width, x, y)
+
+    def _repr_html_(self) -> str:
+        from branches.draw.notebook import to_html
+
+        return to_html(self)
+
+    # --- tables ---------------------------------------------------------------------------------------------------------
+
+    def to_pandas(self):
+        """Return the table of points as a ``pandas.DataFrame``; ImportError says what to install if pandas is missing."""
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
+        return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
+
+    def to_xarray(self):
+        """Return the table of points as an ``xarray.Dataset`` along ``point``, with the meaning of each column.
+
+        Each variable has its meaning as ``long_name``; the attributes of the dataset are the scene as YAML, ``status`` and
+        ``stop``. ImportError says what to install if xarray is missing.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError("to_xarray needs xarray, which is not installed: pip install xarray") from error
+        columns = {name: self.points[name] for name in self.points.dtype.names if name not in ("point", "label")}
+        columns["label"] = np.array([label.decode() for label in self.points["label"]])
+        words = self.columns.all
+        variables = {
+            name: ("point", values, {"long_name": words[name].words if name in words else name})
+            for name, values in columns.items()
+        }
+        about = {"config": self.scene_text(), "status": self.status, "stop": self.stop}
+        return xarray.Dataset(variables, {"point": self.points["point"]}, about)

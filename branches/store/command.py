@@ -1,0 +1,56 @@
+"""What all commands share: the command line, one sentence for a mistake in it, and standard output."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+
+# Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
+
+
+#: What is typed before the name of a command; the program ``ribbon`` sets another.
+prefix = "python -m branches."
+
+
+def typed(command: str) -> str:
+    """Return how a command is typed: as the present one, ``ribbon run`` or ``python -m branches.run``."""
+    return f"{prefix}{command}"
+
+
+class Parser(argparse.ArgumentParser):
+    """The command line of a command; a mistake in it is answered in one sentence."""
+
+    def __init__(self, command: str, description: str, epilog: str | None = None):
+        super().__init__(typed(command), allow_abbrev=False, description=description, epilog=epilog)
+
+    def error(self, message):
+        complain(f"error: {message} (--help shows what there is)")
+        raise SystemExit(2)
+
+
+def survive_any_encoding() -> None:
+    """Let standard output escape what its encoding lacks (± in ASCII, an odd file name) instead of failing."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def complain(text: str) -> None:
+    """One line to standard error; where that fails too (a closed terminal), the exit code is all that is left to say it."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
+
+
+def write_output(text: str = "") -> None:
+    """Write to standard output at once; nobody reading it any more (``| head``) is no error, the run goes on without."""
+    if sys.stdout is None:  # closed from the start
+        return
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):
+            complain(f"error: cannot write to standard output: {error.strerror}")
+        # what is still buffered must go somewhere, or Python complains about it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

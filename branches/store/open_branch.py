@@ -1,0 +1,206 @@
+"""A result file of an open strip in memory: stages with their pieces, shapes, and what snaps release."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from branches.draw.shapes import standing
+from branches.draw.solid import widest
+from branches.draw.strip import ROOM
+from branches.scene.labels import without_round_off
+from branches.store.branch import Piece, Snap, StoredBranch
+from branches.store.files import StoreError
+from ribbon_model.ends import DIRECTIONS
+from ribbon_model.equilibrium import strains_of
+from ribbon_model.open_strip import OpenStrip
+from ribbon_model.shape import Shape, interpolated, shape_of
+
+#: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
+_SAME = 1e-6
+#: Width of a drawn strip of unknown dimensions, over its length.
+_WIDTH = 0.06
+#: Colours of stages (Okabe and Ito), told apart by the colour-blind.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
+
+class OpenBranch(StoredBranch):
+    """The result file of an open strip; as `branches.read.StoredBranch`, with lengths over that of the strip."""
+
+    def strains(self, point: int) -> np.ndarray:
+        """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
+        return self._strains(point, *self.states_at(point))
+
+    def _strains(self, point: int, t: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Return the same for states (K, n) at places t (K,)."""
+        problem = self._strip(point).problem
+        values = [*self._numbers(point).values()]
+        return strains_of(states[:, :4], problem.batch("field").values(t, states, states[:0], np.array(values)))
+
+    def _strip(self, point: int) -> OpenStrip:
+        """Return the strip of the stage of a point."""
+        return self.scene.strip(int(self.points["stage"][point]))
+
+    def _numbers(self, point: int) -> dict[str, float]:
+        """Return the values of all numbers of the strip at a point."""
+        row, names = self.points[point], self.points.dtype.names
+        return {name: float(row[name]) if name in names else 0.0 for name in self._strip(point).problem.parameters}
+
+    def shape(self, point: int) -> Shape:
+        """Return the strip at a kept point, of length 1, on the axes of its first end."""
+        return self._shape(point, *self.states_at(point))[0]
+
+    def _shape(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
+        """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
+        material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
+        strains = self._strains(point, t, states)
+        shape = shape_of(t, states, strains if material.form.has_rulings else np.zeros((len(t), 3)))
+        along = {
+            field: np.array([float(material.datum(name)(s, numbers)) for s in t])
+            for field, name in (("breadth", "width"), ("depth", "thickness")) if name in material.along
+        }  # fmt: skip
+        return replace(shape, **along), strains
+
+    def solution(self, point: int):
+        """Open strips have no `ribbon_model.solution.Solution`; raise StoreError."""
+        raise StoreError("loops are of closed strips, and this result is of an open one (shape and strains give its states)")
+
+    def placed(self, point: int, length: float, cells: int = 0) -> tuple[Shape, np.ndarray]:
+        """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.
+
+        The axes are tangent, width and normal of its first end, or the weight points downwards. Between the nodes of the
+        solution, its polynomials are evaluated at further places until there are at least as many ``cells``.
+        """
+        t, states = self.states_at(point)
+        pieces = -(-cells // (len(t) - 1))
+        if pieces > 1:
+            nodes, parts = t, np.arange(pieces) / pieces
+            t = np.append((t[:-1, None] + np.diff(t)[:, None] * parts).ravel(), t[-1])
+            states = interpolated(nodes, states, self.degree(point), t)
+        shape, strains = self._shape(point, t, states)
+        shape = standing(shape, self.up)
+        middle = shape.centreline.mean(axis=0)
+        return replace(
+            shape, arclength=shape.arclength * length, centreline=(shape.centreline - middle) * length
+        ), strains / length
+
+    @property
+    def length(self) -> float:
+        """The length of the scene's dimensions; 1 without them."""
+        return self.scene.dimensions.length if self.scene.dimensions else 1.0
+
+    def width_at(self, length: float, thickness: float | None) -> float | None:
+        """Return the width of the scene's dimensions, or that from a thickness and Gamma = w^2/(h L), or None.
+
+        It is that of the place where the width along the strip is 1.
+        """
+        if self.scene.dimensions:
+            return self.scene.dimensions.width / self.scene.dimensions.length * length
+        Gamma = self.scene.material.get("Gamma")
+        return math.sqrt(Gamma * thickness * length) if Gamma and thickness else None
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The direction that is up in pictures: against the weight, if there is one, otherwise the normal of the first end."""
+        strip = self.scene.strip()
+        return tuple(-x for x in strip.weight_direction) if "weight" in strip.parameters else DIRECTIONS["normal"]
+
+    @property
+    def about(self) -> str:
+        """The strip in words."""
+        return self.scene.title or self.scene.name
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Columns of labelled points that a notebook shows."""
+        followed = dict.fromkeys(stage.follow for stage in self.scene.stages)
+        return ("point", "label", "name", "stage", *followed, "energy", "index")
+
+    # --- pictures -------------------------------------------------------------------------------------------------------
+
+    @property
+    def caption(self) -> str:
+        return self.about
+
+    def colour(self, stage: int) -> str:
+        return _COLOURS[(stage - 1) % len(_COLOURS)]
+
+    def posed(self, points: list[int]) -> dict[int, Shape]:
+        """As `StoredBranch.posed`: the direction `up` is up, and each strip in the middle of its picture."""
+        found = {}
+        for point in points:
+            shape = standing(self.shape(point), self.up)
+            middle = (shape.centreline.max(axis=0) + shape.centreline.min(axis=0)) / 2
+            found[point] = replace(shape, centreline=shape.centreline - middle)
+        return found
+
+    def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
+        if asked is None:
+            asked = self.width_at(1.0, None) or _WIDTH
+        return min([asked, *(ROOM * widest(strip) for strip in strips)])
+
+    # --- places ---------------------------------------------------------------------------------------------------------
+
+    def place(self, row: int) -> str:
+        """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
+        event = self.events[row]
+        name = self.followed(int(event["stage"]))
+        value = without_round_off(event[name], abs(self.points[name][self.points["stage"] == event["stage"]]).max())
+        return f"{name} = {value * self.scene.factor(name):.4f} of stage {event['stage']}"
+
+    def origin(self, stage: int) -> int:
+        """Return the point of an earlier stage from which a stage starts."""
+        one = self.scene.stages[stage - 1]
+        events = self.events[self.events["stage"] == (one.stage or stage - 1)]
+        place = one.place_among([(event["label"].decode(), event["name"].decode()) for event in events])
+        return int(events["point"][place])
+
+    def snaps(self) -> list[Snap]:
+        """Return the folds at which a stable piece ends, with the stable state below that the file has, if any."""
+        pieces, found = self.pieces(), []
+        for event in self.events:
+            if event["label"] != b"LP" or 0 not in (event["index_before"], event["index_after"]):
+                continue
+            row, name = int(event["point"]), self.followed(int(event["stage"]))
+            energy, value = self.points["potential"], float(event[name])
+            for piece in pieces:
+                state = self._below(piece, row, name, value) if piece.stable else None
+                if state is not None and energy[row] - state["potential"] > _SAME * (1 + abs(energy[row])):
+                    found.append(Snap(row, name, value, state, float(energy[row] - state["potential"])))
+        best: dict[int, Snap] = {}
+        for snap in found:
+            if snap.row not in best or snap.released > best[snap.row].released:
+                best[snap.row] = snap
+        return list(best.values())
+
+    def _below(self, piece: Piece, row: int, name: str, value: float) -> dict[str, float] | None:
+        """Return the columns of a stable piece where the followed number has a value, None if it does not get there."""
+        if self.followed(piece.stage) != name or not self.same_strip(piece.rows[0], row, name):
+            return None
+        x, conjugate = self.points[name][piece.rows], self.conjugate(name)
+        for i in range(len(x) - 1):
+            if (x[i] - value) * (x[i + 1] - value) <= 0 and x[i] != x[i + 1] and row not in piece.rows[i : i + 2]:
+                columns = {conjugate: self.points[conjugate], "potential": self.points["potential"]}
+                return {column: self._between(piece.rows, i, name, value, values) for column, values in columns.items()}
+        return None
+
+    def _between(self, rows: np.ndarray, i: int, name: str, value: float, column: np.ndarray) -> float:
+        """Return a column where a number has a value between points i and i + 1 of a piece, from the points around."""
+        from scipy.interpolate import BarycentricInterpolator  # type: ignore[import-untyped]  # .2 s; only values between points need it
+
+        near = rows[max(i - 1, 0) : i + 3]
+        return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
+
+    def same_strip(self, first: int, second: int, name: str = "") -> bool:
+        """Return whether two points agree in what is held, and in all prescribed numbers but the named one."""
+        strip, same = (self.scene.strip(int(self.points["stage"][row])) for row in (first, second))
+        if strip is not same:
+            return False
+        for other in strip.parameters:
+            a, b = (float(self.points[other][row]) for row in (first, second))
+            if other != name and abs(a - b) > _SAME * (1 + abs(a)):
+                return False
+        return True

@@ -1,0 +1,1 @@
+"""``python -m branches.strip``: the states of closed strips of given dimensions, in SI units."""

@@ -1,0 +1,110 @@
+"""``python -m branches.strip --width ...``: the states of a closed strip of given dimensions, in SI units."""
+
+from __future__ import annotations
+
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin(interrupt.NO_FILES)
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from branches.scene.units import STRIP_UNITS, quantity
+from branches.store.command import Parser, complain, survive_any_encoding, write_output
+from branches.store.files import StoreError, check_picture
+from ribbon_model.strip import Strip
+
+_HELP = {"": "Poisson's ratio", "Pa": "Pa, or with a unit as in 210GPa", "m": "m, or with a unit as in 5mm"}
+#: Most turns of a loop that --want and --chart take.
+_MOST_TURNS = 15
+
+
+def parser() -> Parser:
+    """Return the command line."""
+    parser = Parser(
+        "strip",
+        "A strip whose ends are joined: which circles are stable, what else there is, moments, energies, strains. Numbers are "
+        "in SI units, or have a unit.",
+    )
+    for name, unit in STRIP_UNITS.items():
+        more = "; inf for a straight strip" if name == "natural_radius" else ""
+        parser.add_argument(
+            f"--{name.replace('_', '-')}", type=_Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
+        )
+    parser.add_argument("--yield-strain", type=float, metavar="X", help="mark states with a larger strain")
+    parser.add_argument("--want", type=float, metavar="J", help="which dimensions give a stable loop with a barrier of J")
+    parser.add_argument("--chart", metavar="FILE", help="draw the barrier over width and natural curvature (.png, .pdf, .svg)")
+    parser.add_argument("--turns", type=int, metavar="M", help="turns of the loop of --want and --chart, odd (default 3)")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the answer; return the exit code: 0, or 2 for an invalid strip."""
+    options = vars(parser().parse_args(argv))
+    survive_any_encoding()
+    asked = {name: options.pop(name) for name in ("yield_strain", "want", "chart", "turns", "quiet")}
+    try:
+        _check(asked)
+        strip = Strip(**options)
+    except (StoreError, ValueError) as error:
+        complain(f"error: {error}")
+        return 2
+    return _answer(strip, asked)
+
+
+class _Quantity:
+    """The type of an option with a unit."""
+
+    def __init__(self, unit: str):
+        self._unit = unit
+
+    def __call__(self, text: str) -> float:
+        try:
+            return quantity(text, self._unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _check(asked: dict) -> None:
+    """Raise for an option that cannot be used."""
+    for name in ("yield_strain", "want"):
+        if asked[name] is not None and not 0 < asked[name] < math.inf:
+            raise ValueError(f"{name}: {asked[name]:g} must be positive and finite")
+    turns = asked["turns"]
+    if turns is not None and not (turns % 2 and 1 <= turns <= _MOST_TURNS):
+        raise ValueError(f"turns: {turns} must be odd, from 1 to {_MOST_TURNS}: a loop cannot be folded into others")
+    if turns is not None and asked["want"] is None and asked["chart"] is None:
+        raise ValueError("turns: it belongs to want or chart, and neither is given")
+    if asked["chart"] is not None:
+        check_picture(Path(asked["chart"]))
+
+
+def _answer(strip: Strip, asked: dict) -> int:
+    """Write what is asked for; return the exit code."""
+    from threadpoolctl import threadpool_limits
+
+    from branches.strip import report, wants  # .5 s: not for a mistake in the dimensions
+
+    turns, quiet = asked["turns"] or 3, asked["quiet"]
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        if asked["want"] is None and asked["chart"] is None:
+            write_output(report.answer(strip, asked["yield_strain"], quiet))
+        if asked["want"] is not None:
+            write_output(wants.answer(strip, turns, asked["want"], quiet))
+        if asked["chart"] is not None:
+            try:
+                wants.chart(strip, turns, Path(asked["chart"]), quiet)
+            except StoreError as error:
+                complain(f"error: {error}")
+                return 2
+            write_output(f"written to {asked['chart']}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.run(main))
