@@ -141,20 +141,22 @@ class _Lowering:
 
     def program(self) -> Program:
         """Return the program."""
-        operations = self.tape.operations
         wanted = {place for place, _ in self.results}
-        for place in self.needed:
+        for place in filter(self.varies.__getitem__, self.needed):
+            wanted.update(self.tape.operations[place].operands)
+        kept = [place for place in self.once if place in wanted]
+        first = _Stretch(self, self.once, {place: [("keep", self.scalars + k)] for k, place in enumerate(kept)})
+        self.scalars += len(kept)
+        moves, fixed = dict[int, Moves](), list[tuple[str, int, int]]()
+        for place, where in self.results:
+            name, at = ("store slope", where.at) if isinstance(where, Slope) else ("store", where)
             if self.varies[place]:
-                wanted.update(operations[place].operands)
-        first = _Stretch(self, self.once, {}, keeps=wanted)
-        stores: dict[int, list[int | Slope]] = {}
-        for place, where in self.results:
-            stores.setdefault(place, []).append(where)
-        second = _Stretch(self, self._ordered(), stores)
-        for place, where in self.results:
-            if not self.varies[place]:
-                name = "store scalar slope" if isinstance(where, Slope) else "store scalar"
-                second.code.append([CODES[name], _at(where), self.scalar[place], 0, 0])
+                moves.setdefault(place, []).append((name, at))
+            else:
+                fixed.append((name.replace("store", "store scalar"), at, self.scalar[place]))
+        second = _Stretch(self, self._ordered(), moves)
+        for row in fixed:
+            second.write(*row)
         last = len(first.code) + len(second.code)
         for at in self.begins:
             self.lists[at] += last
@@ -184,12 +186,12 @@ class _Lowering:
         return found
 
 
+#: Where a result goes: instructions that move it, and their targets.
+Moves = list[tuple[str, int]]
+#: No registers.
+_NONE: Mapping[int, int] = {}
 #: Instructions that move numbers.
 _SILENT = ("load u", "load v", "load t", "fill", "keep", "store", "store scalar", "store slope", "store scalar slope")
-
-
-def _at(where: int | Slope) -> int:
-    return where.at if isinstance(where, Slope) else where
 
 
 class _Stretch:
@@ -200,50 +202,41 @@ class _Stretch:
     shared : _Lowering
     places : sequence of int
         The operations, in order.
-    stores : mapping of int to list
-        Where results are stored, by operation.
-    keeps : container of int
-        Operations whose results become scalars.
+    moves : mapping of int to list
+        Where results go, by operation: the instruction that moves each (store, keep, copy), and its target.
     given : mapping of int to int
         Registers of operations that are computed elsewhere.
     first : int
         The first register that may be used.
-    pinned : mapping of int to int
-        Registers that results are to be found in afterwards.
     """
 
     def __init__(
-        self, shared: _Lowering, places: Sequence[int], stores: Mapping[int, list[int | Slope]], *,
-        keeps: Container[int] = (), given: Mapping[int, int] | None = None, first: int = 0,
-        pinned: Mapping[int, list[int]] | None = None,
+        self, shared: _Lowering, places: Sequence[int], moves: Mapping[int, Moves], given: Mapping[int, int] = _NONE,
+        first: int = 0,
     ) -> None:  # fmt: skip
         self.shared, self.operations, self.scalar = shared, shared.tape.operations, shared.scalar
-        self.registers, self.given, self.inside = dict(given or {}), set(given or {}), {*places, *(given or {})}
+        self.registers, self.given, self.inside = dict(given), set(given), {*places, *given}
         self.code: list[list[int]] = []
         self.free: list[int] = []
         self.most = first
-        pinned = pinned or {}
-        self.fused = self._fusible(places, stores, keeps, pinned)
+        self.fused = self._fusible(places, moves)
         self.left = Counter(operand for place in places if place not in self.fused for operand in self._operands(place))
         for place in places:
             if place in self.fused:
                 continue
             self._instruct(place)
-            for where in stores.get(place, ()):
-                name = "store slope" if isinstance(where, Slope) else "store"
-                self.code.append([CODES[name], _at(where), self.registers[place], 0, 0])
-            for register in pinned.get(place, ()):
-                self.code.append([CODES["copy"], register, self.registers[place], 0, 0])
-            if place in keeps:
-                self.scalar[place] = shared.scalars
-                self.code.append([CODES["keep"], shared.scalars, self.registers[place], 0, 0])
-                shared.scalars += 1
+            for name, target in moves.get(place, ()):
+                self.write(name, target, self.registers[place])
+                if name == "keep":
+                    self.scalar[place] = target
             if not self.left[place]:
                 self._release(place)
 
-    def _fusible(
-        self, places: Sequence[int], stores: Container[int], keeps: Container[int], pinned: Container[int]
-    ) -> dict[int, int]:
+    def write(self, name: str, *numbers: int) -> None:
+        """Append an instruction."""
+        self.code.append([CODES[name], *numbers, *[0] * (4 - len(numbers))])
+
+    def _fusible(self, places: Sequence[int], moves: Container[int]) -> dict[int, int]:
         """Return products that are used once, by a sum or difference that takes them in; by product, that operation."""
         uses: Counter[int] = Counter(operand for place in places for operand in self.operations[place].operands)
         fused: dict[int, int] = {}
@@ -253,9 +246,7 @@ class _Stretch:
                 continue
             for operand in reversed(operands):
                 factor = self.operations[operand]
-                if factor.name != "mul" or uses[operand] != 1 or operand in self.given:
-                    continue
-                if operand in stores or operand in keeps or operand in pinned:
+                if factor.name != "mul" or uses[operand] != 1 or operand in self.given or operand in moves:
                     continue
                 registers = [each in self.inside and each not in self.scalar for each in factor.operands]
                 if all(registers) or (name == "add" and any(registers)):
@@ -286,7 +277,7 @@ class _Stretch:
         """Return the register of an operand; a scalar is filled into one."""
         if place not in self.registers:
             register = self.registers[place] = self._take()
-            self.code.append([CODES["fill"], register, self.scalar[place], 0, 0])
+            self.write("fill", register, self.scalar[place])
         return self.registers[place]
 
     def _release(self, place: int) -> None:
@@ -316,7 +307,7 @@ class _Stretch:
                 self._release(operand)
         if name:
             target = self.registers[place] = self._take()
-            self.code.append([CODES[name], target, *given, *[0] * (3 - len(given))])
+            self.write(name, target, *given)
 
     def _load(self, slot: Hashable) -> tuple[str, list[int]]:
         inputs = self.shared.inputs
@@ -375,27 +366,26 @@ class _Stretch:
         at = self.most
         self.most += 5 * k + 4 + len(search.matrix)
         results = [search.potential, *search.slopes, *search.matrix]
-        pinned: dict[int, list[int]] = {}
+        moves: dict[int, Moves] = {}
         for number, result in enumerate(results):
-            pinned.setdefault(result, []).append(at + k + number)
+            moves.setdefault(result, []).append(("copy", at + k + number))
         depends = shared.tape.reading(results, search.unknowns)
         inner = [each for each in shared.tape.needed(results) if depends[each] and each not in search.unknowns]
         unknowns = {unknown: at + number for number, unknown in enumerate(search.unknowns)}
         varying = {operand: register for operand, register in registers.items() if operand not in self.scalar}
-        sub = _Stretch(shared, inner, {}, given={**varying, **unknowns}, first=self.most, pinned=pinned)
-        for result, targets in pinned.items():
-            if not depends[result] or result in unknowns:
-                for target in targets:
-                    scalar = result in self.scalar
-                    source = self.scalar[result] if scalar else {**varying, **unknowns}[result]
-                    sub.code.append([CODES["fill" if scalar else "copy"], target, source, 0, 0])
+        given = {**varying, **unknowns}
+        sub = _Stretch(shared, inner, moves, given, self.most)
+        for result, targets in moves.items():
+            for _, target in targets if not depends[result] or result in unknowns else ():
+                scalar = result in self.scalar
+                sub.write("fill" if scalar else "copy", target, self.scalar[result] if scalar else given[result])
         self.most = sub.most
         start, begin = len(shared.lists), len(shared.searches)
         shared.searches += sub.code
         shared.lists += [k, int(search.minimum) + int(search.saddles), begin, len(shared.searches), at, *starts]
         shared.begins += [start + 2, start + 3]
         shared.unknowns = max(shared.unknowns, k)
-        self.code.append([CODES["root"], at, start, 0, 0])
+        self.write("root", at, start)
         for each in self.inside:
             other = self.operations[each]
             if other.name == "root" and other.data[0] == search and other.operands == operation.operands:
