@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import warnings
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,11 +49,6 @@ class _Estimated(NamedTuple):
 
     values: Array
     errors: Array
-
-
-def _rounded(values: Array) -> _Estimated:
-    """Return values with their round-off."""
-    return _Estimated(values, np.finfo(float).eps * np.abs(values).max(axis=1, initial=0.0))
 
 
 class Interpreted:
@@ -138,29 +133,16 @@ class Interpreted:
     # --- derivatives ---------------------------------------------------------------------------------------------
 
     def _along(self, t: Array, x: Array, directions: Sequence[Array]) -> _Estimated:
-        """Return derivatives along directions."""
-        if not directions:
-            return _rounded(self._values(t, x))
-        *others, last = directions
+        """Return the derivative along directions, by differences as long as its error estimate allows.
 
-        def inner(t: Array, x: Array, places: Indices) -> _Estimated:
-            return self._along(t, x, [direction[places] for direction in others])
-
-        return self._difference(inner, t, x, last, nested=bool(others))
-
-    def _difference(
-        self,
-        function: Callable[[Array, Array, Indices], _Estimated],
-        t: Array,
-        x: Array,
-        direction: Array,
-        nested: bool = False,
-    ) -> _Estimated:
-        """Return the derivative of a function along a direction, by differences as long as its error estimate allows.
-
-        ``function`` takes times and inputs of some places, and the numbers of these places. A shorter length is not tried where
-        the differences of second and of fourth order agree within the round-off of the values.
+        That along several is the difference of those along the others. A shorter length is not tried where the differences
+        of second and of fourth order agree within the round-off of the values.
         """
+        if not directions:
+            values = self._values(t, x)
+            return _Estimated(values, np.finfo(float).eps * np.abs(values).max(axis=1, initial=0.0))
+        *others, direction = directions
+        nested = bool(others)
         moving, at, first = direction != 0, np.abs(np.where(np.isfinite(x), x, 0.0)), _NESTED if nested else _DIFFERENCE
         sizes = np.maximum(at, 1.0) if nested else np.where(at < _LEAST, 1.0, at)
         length = first * np.where(moving, sizes / np.where(moving, np.abs(direction), 1.0), np.inf).min(axis=1)
@@ -170,7 +152,7 @@ class Interpreted:
         for _ in range(_TIMES + 1):
             h = length[left, None]
             step = h * direction[left]
-            ends = [function(t[left], x[left] + k * step, left) for k in (1, -1, 2, -2)]
+            ends = [self._along(t[left], x[left] + k * step, [other[left] for other in others]) for k in (1, -1, 2, -2)]
             with np.errstate(all="ignore"):
                 sides = ends[0].values - ends[1].values, ends[2].values - ends[3].values
                 fourth = sum(weight * side for weight, side in zip(_WEIGHTS, sides)) / h

@@ -22,7 +22,7 @@ from contin.functions import derivatives
 from contin.functions.interpreter import of_columns
 from contin.functions.recorded_arrays import NUMPY, recorded, select
 from contin.functions.recording import recorded_paths
-from contin.functions.signature import argument_count
+from contin.functions.signature import argument_count, flat
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -257,10 +257,9 @@ def _sought(
     results: Callable[[Tape, Search, Sequence[Number]], list[Number]],
 ) -> list[Any]:  # fmt: skip
     """Return ``results`` of the search: recorded where one of the numbers is, else evaluated on a tape of their own."""
-    starts = list(checks.sequence("start", start, "numbers"))
+    starts = [flat(each) for each in checks.sequence("start", start, "numbers")]  # np.where gives arrays without dimensions
     for each in starts:
-        plain = each[()] if isinstance(each, np.ndarray) and each.ndim == 0 else each  # as np.where gives of numbers
-        if not (isinstance(plain, Number) or checks.is_number(plain)):
+        if not (isinstance(each, Number) or checks.is_number(each)):
             raise ProblemError(f"start: {checks.shown(each)} must be a number")
     if not 1 <= len(starts) <= _MOST:
         raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
