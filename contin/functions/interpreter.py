@@ -55,7 +55,7 @@ _REGISTER = 8 * LANES
 #: Bytes of a group.
 _BYTES = 8 * _GROUP
 #: Bytes of an instruction.
-_ROW = 40
+_ROW = 8 * 5
 
 
 class Memory(NamedTuple):

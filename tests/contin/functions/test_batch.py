@@ -129,3 +129,42 @@ def test_one_function_of_other_states_is_another_batch():
         batch = Batch([lambda t, u, p: p.b], [0], ["x"], parameters)
         values = batch.values(np.zeros(1), np.zeros((1, 1)), np.empty((0, 1)), np.array([1.0, 2.0]))
         assert values == pytest.approx(b, rel=1e-15)
+
+
+@pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
+def test_what_is_recorded_and_what_python_evaluates_answer_the_same():
+    """Every method of a batch, of a function and of the same function in Python, as ``try`` cannot be recorded."""
+
+    def recorded(u, p):
+        return u.x**2 * p.a + math.sin(u.y), u.x * u.y
+
+    def in_python(u, p):
+        try:
+            return recorded(u, p)
+        finally:
+            pass
+
+    batches = [Batch([function], [2], ["x", "y"], ["a"], times=False) for function in (recorded, in_python)]
+    assert (
+        [batch.recorded is None for batch in batches] == [batch.interpreted is not None for batch in batches] == [False, True]
+    )
+    given = np.zeros(3), np.array([[0.4, 1.2], [0.9, -0.3], [1.5, 0.8]]), np.empty((0, 2)), np.array([1.7])
+    one = (given[0][:1], given[1][:1], *given[2:])
+    random = np.random.default_rng(1)
+    directions, weights = random.standard_normal((2, 3, 3)), random.standard_normal((3, 2))
+    answers = []
+    for batch in batches:
+        columns = batch.columns([0], [1, 0])
+        values, entries = batch.entries(*one, columns)
+        jacobian = np.zeros((2, columns.width))
+        jacobian[columns.rows, columns.places] = entries
+        answers.append(
+            [
+                batch.values(*given), *batch.jacobian(*given, columns), values, jacobian, batch.along(*given, directions),
+                batch.jacobian_along(*given, columns, directions[:1]), batch.bent(*given, weights, directions[0], columns),
+            ]
+        )  # fmt: skip
+    for own, other in zip(*answers):
+        assert own.shape == other.shape and own == pytest.approx(other, abs=1e-7)
+    with pytest.raises(ProblemError, match="there is no text: evaluated in Python, because in_python catches exceptions"):
+        batches[1].text(["x", "y", "a"])
