@@ -2,45 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
-
-@runtime_checkable
-class Axes(Protocol):
-    """What is asked of matplotlib's axes, on which pictures are drawn."""
-
-    @property
-    def plot(self) -> Callable[..., Any]:
-        """Draw lines."""
-
-    @property
-    def scatter(self) -> Callable[..., Any]:
-        """Draw marks."""
-
-    @property
-    def annotate(self) -> Callable[..., Any]:
-        """Write a text, or draw an arrow."""
-
-    @property
-    def axvline(self) -> Callable[..., Any]:
-        """Draw a vertical line."""
-
-    @property
-    def legend(self) -> Callable[..., Any]:
-        """Add the legend."""
-
-    @property
-    def margins(self) -> Callable[..., Any]:
-        """Set margins."""
-
-    @property
-    def set(self) -> Callable[..., Any]:
-        """Set properties."""
-
-    @property
-    def get_legend_handles_labels(self) -> Callable[..., Any]:
-        """Return what the legend shows, and its names."""
+if TYPE_CHECKING:  # matplotlib is imported where it draws only
+    from matplotlib.axes import Axes as Axes
+else:
+    Axes = object
 
 
 def new_axes(count: int = 1) -> Any:

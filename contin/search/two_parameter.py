@@ -151,43 +151,42 @@ def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hol
         return _event(start, base, x, event)
     if hold is not None:
         return _value(_holding(start, hold), base, x)
-    for kind in _KINDS_ON_CURVES if start.system.on_curve else _KINDS:
-        found = kind(start, base, x)
-        if found is not None:
-            return found
-    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
+    found = (_on_curve if start.system.on_curve else _on_branch)(start, base, x)
+    if found is None and _is_at_a_value(start):
+        found = _value(start, base, x)
+    if found is None:
+        raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
+    return found
 
 
-def _branch_points(start: Point, base: System, x: Array) -> _First | None:
-    return (BranchPointCurve(base), np.append(x, 0.0)) if start.is_simple_branch_point else None
-
-
-def _folds(start: Point, base: System, x: Array) -> _First | None:
-    return (FoldCurve(base), x) if start.label == Label.FOLD and start.column else None
-
-
-def _of_the_kind(start: Point, base: System, x: Array) -> _First | None:
+def _on_branch(start: Point, base: System, x: Array) -> _First | None:
+    """Return the defining system of special points of a branch, and its first x."""
+    if start.is_simple_branch_point:
+        return BranchPointCurve(base), np.append(x, 0.0)
+    if start.label == Label.FOLD and start.column:
+        return FoldCurve(base), x
+    if start.label == Label.EXTREMUM and start.column:
+        return ExtremumCurve(base, start.column), x
     return base.defining(start, x)
 
 
-def _extrema(start: Point, base: System, x: Array) -> _First | None:
-    return (ExtremumCurve(base, start.column), x) if start.label == Label.EXTREMUM and start.column else None
+def _on_curve(start: Point, base: Any, x: Array) -> _First | None:
+    """Return that of special points of a curve: extrema of its own column, and points of codimension two.
 
-
-def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
-    """An extremum along a curve of extrema; a fold with respect to the parameter of a curve of folds is one, too."""
+    A fold with respect to the parameter of a curve of folds is an extremum, too.
+    """
     objective = base.stationary
-    if not objective or start.label not in (Label.EXTREMUM, Label.FOLD) or start.column != objective:
+    if objective and start.label in (Label.EXTREMUM, Label.FOLD) and start.column == objective:
+        return ExtremumCurve(base.base, objective), x[: base.base.size]
+    if _is_at_a_value(start):
         return None
-    return ExtremumCurve(base.base, objective), x[: base.base.size]
+    tests = (test for test in start.system.events() if (test.label, test.name) == (start.label, start.name))
+    return next(((EventCurve(base, test), x) for test in tests), None)
 
 
-def _values(start: Point, base: System, x: Array) -> _First | None:
-    """A point where a column has a given value."""
-    value = start.value
-    if value is None or not abs(start[start.column] - value) <= _LOCATED * (1 + abs(value)):
-        return None
-    return _value(start, base, x)
+def _is_at_a_value(start: Point) -> bool:
+    """Return whether a column has the value that the point was located for."""
+    return start.value is not None and abs(start[start.column] - start.value) <= _LOCATED * (1 + abs(start.value))
 
 
 def _holding(start: Point, column: str) -> Point:
@@ -224,14 +223,6 @@ def _slope(column: str, system: System, x: Array) -> Array:
     return found
 
 
-def _of_codimension_two(start: Point, base: System, x: Array) -> _First | None:
-    """A point that a test function of its curve has labelled."""
-    for test in start.system.events():
-        if (test.label, test.name) == (start.label, start.name):
-            return EventCurve(base, test), x
-    return None
-
-
 def _event(start: Point, base: System, x: Array, event: Event) -> _First:
     """A zero of a user's test function.
 
@@ -251,11 +242,9 @@ def _event(start: Point, base: System, x: Array, event: Event) -> _First:
 
 #: A value at a located point differs from the one that was looked for by less than this, relative to 1 + its size.
 _LOCATED = 1e-6
-#: What a start may be, in words, and in the order in which it is asked.
+#: What a start may be, in words.
 _STARTS = (
     "one of LP, BP, HB (of equilibria), PD, TR, EX, a special point of homoclinic orbits, or one where a column has a value "
     "(UZ, EP); "
     "for one of your own events, give it as event"
 )
-_KINDS = (_branch_points, _folds, _of_the_kind, _extrema, _values)
-_KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)
