@@ -83,7 +83,7 @@ def own_test_of(label: str, system: ConnectionEquations, x: Array) -> Event | No
     trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
     if label in (Label.INCLINATION_FLIP_STABLE, Label.INCLINATION_FLIP_UNSTABLE):
         return _inclination_flip("SU".index(label[-1]), known=True)
-    found = [test for test in homoclinic_points(system) if test.label == located != "EP"]
+    found = [test for test in homoclinic_points(system) if test.label == located != Label.END]
     return min(found, key=lambda test: abs(test.function(trial)), default=None)
 
 

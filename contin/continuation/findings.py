@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contin.continuation.notes import Notes, why_lost
+from contin.core.labels import BY_VALUES, CONFIRMED, Label
 from contin.core.settings import Settings
 from contin.core.trial import Event
 from contin.events.arc import Arc, SpecialPoint
@@ -16,11 +17,6 @@ from contin.events.index import Stability, nullity_of
 from contin.events.refinement import refined
 from contin.events.usual import with_normal_form
 from contin.results.point import Point
-
-#: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
-_CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
-#: Labels of points that no derivative by the solution tells.
-_BY_VALUES = ("EP", "UZ", "MX")
 
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
@@ -30,12 +26,12 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
     if not found.label or not (found.is_located or found.stop is not None):
         return found  # a regular point, or one that gets no label
-    labelled = found.label != "MX" and not found.closes
+    labelled = found.label != Label.FAILED and not found.closes
     first, coarse = found.trial, found.trial.system.coefficient(found)
     if found.errors is None and labelled and settings.errors:
         again = refined(found.same_as or found, settings)
         details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
-        if found.label not in _BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
+        if found.label not in BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
             errors, is_lost = dict.fromkeys(errors, np.nan), True
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
     if coarse is not None:
@@ -51,7 +47,7 @@ def is_confirmed(point: SpecialPoint, arc: Arc, notes: Notes) -> bool:
     Newton's method fails on the finer mesh; that is noted.
     """
     what = f"{point.label} {point.name}".strip()
-    unknown = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+    unknown = point.label in CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
     if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
         if point.stop is None and unknown:
             notes.add(f"{what} at {notes.place(point.trial)}: its ± is nan, since Newton's method failed at the second look")
@@ -74,7 +70,7 @@ def index_changes(index: Event | None, arc: Arc, special: Sequence[SpecialPoint]
     changes: list[IndexChange | None] = []
     for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
         changes += [pair if nullity_of(point) else None for point in group]
-        if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == "LP" and after == before):
+        if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == Label.FOLD and after == before):
             name = f"{group[0].label} {group[0].full_name}".strip()
             notes.add(f"the index goes from {before:g} to {after:g} at {name} ({notes.place(group[0].trial)})")
     return changes
@@ -86,7 +82,7 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
     stability = Stability() if index is None else system.stability(found)
     return Point(
-        found.label, found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength,
+        str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength,
         trial.iterations, trial.newton_error, found.errors or {}, found.details,
         stability.index, stability.nullity, change, stability.breaks,
         *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,

@@ -27,6 +27,7 @@ from contin.continuation.meshes import MeshPolicy, Moved
 from contin.continuation.notes import Notes
 from contin.continuation.rules import NOISY
 from contin.continuation.steps import Step, Steps
+from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
 from contin.core.state import Reason, State, Stop
@@ -153,7 +154,7 @@ class Continuation:
     def __iter__(self) -> Iterator[Point]:
         if not self._resumed:
             trial = self.here()
-            first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
+            first = SpecialPoint(0.0, Label.BRANCH_POINT if self.state.singular else Label.END, "start", trial)
             located = located_again(dataclasses.replace(first, label=trial.system.judged(first).label), self.settings)
             self._notes.corners(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
@@ -221,7 +222,7 @@ class Continuation:
             if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
                 return
             self.stop = stop
-            label, name = ("EP", stop.event) if stop.event else ("MX", "no convergence")
+            label, name = (Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
         self._accuracy = accuracy_of(step.end)
@@ -244,7 +245,7 @@ class Continuation:
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes)
-        label, name = ("EP", str(self.stop.reason)) if self.stop else ("", "")
+        label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
 

@@ -10,17 +10,7 @@ from contin.arrays import Array
 from contin.core.settings import Settings
 from contin.core.settling import settled
 from contin.core.state import State
-from contin.core.step import (
-    ASTRAY,
-    Judgement,
-    aims,
-    corrected,
-    following_step,
-    is_astray,
-    judged,
-    longest_step,
-    predict,
-)
+from contin.core.step import ASTRAY, Judgement, aims, corrected, following_step, is_astray, judged, longest_step, predict
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint

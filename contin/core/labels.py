@@ -38,3 +38,13 @@ class Label(enum.StrEnum):
     SHILNIKOV_HOPF = "SH"
     INCLINATION_FLIP_STABLE = "IFS"
     INCLINATION_FLIP_UNSTABLE = "IFU"
+
+    __repr__ = str.__repr__
+
+
+#: Those where F_x has a kernel beyond the tangent: an index may change there.
+SINGULAR = frozenset((Label.FOLD, Label.BRANCH_POINT, Label.CUSP))
+#: Those of points that are in doubt where they are not found again on a finer mesh; others keep theirs with ± NaN.
+CONFIRMED = frozenset((Label.FOLD, Label.BRANCH_POINT, Label.HOPF, Label.PERIOD_DOUBLING, Label.TORUS))
+#: Those of points that no derivative by the solution tells.
+BY_VALUES = frozenset((Label.END, Label.USER_ZERO, Label.FAILED))

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
 from contin.cycles.curves import DoublingCurve, TorusCurve
-from contin.cycles.floquet import critical_angle, doubled, doubling, torus, unstable
+from contin.cycles.floquet import critical_angle, doubled, doubles, doubling, torus, unstable
 from contin.cycles.folds import events_on_folds
 from contin.events.arc import SpecialPoint
-from contin.events.labelled import doubles
 
 
 class OfCycles(Discretization):
@@ -46,7 +46,9 @@ class OfCycles(Discretization):
         system: Any = self
         if doubles(point):
             return DoublingCurve(system), x
-        return (TorusCurve(system), np.append(x, math.cos(critical_angle(system, point, x)))) if point.label == "TR" else None
+        if point.label == Label.TORUS:
+            return TorusCurve(system), np.append(x, math.cos(critical_angle(system, point, x)))
+        return None
 
     def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""

@@ -21,6 +21,7 @@ from typing import Any, cast
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.cycles.normal_forms import MOST
 from contin.defining.critical_curve import CriticalCurve, degenerate
@@ -63,7 +64,7 @@ class MultiplierCurve(CriticalCurve):
 class DoublingCurve(MultiplierCurve):
     """Period doublings: the multiplier -1; the column ``normal_form`` is its coefficient c."""
 
-    kind = "PD"
+    kind = Label.PERIOD_DOUBLING
 
     def coupling(self, kappa: float) -> Array:
         """Return -1."""
@@ -90,7 +91,7 @@ class DoublingCurve(MultiplierCurve):
 class TorusCurve(MultiplierCurve):
     """Torus bifurcations: the multipliers exp(-+ i theta); columns ``normal_form``, Re d, and ``angle``, theta."""
 
-    kind = "TR"
+    kind = Label.TORUS
     own_equations, own_unknowns = 2, 1
     own_columns = ("normal_form", "angle")
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization
 from contin.core.rounding import changes_of_multipliers
@@ -29,7 +30,7 @@ from contin.cycles.map_equations import MapEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.hopf import hopf, hopf_points, passes
-from contin.events.labelled import frequency_of
+from contin.events.labelled import finding_of, frequency_of
 from contin.events.nearness import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.normal_forms import flip, pair
 from contin.events.significance import on_finer_mesh
@@ -184,7 +185,7 @@ def doubling(order: int = 1) -> Event:
     With a symmetry of even order n, M being the map over one n-th of the period, the multiplier over the whole period is
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
-    label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
+    label, name = (Label.PERIOD_DOUBLING, "period doubling") if order % 2 else (Label.BRANCH_POINT, "symmetry breaking")
     return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling, normal_form=flip)
 
 
@@ -202,15 +203,21 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
     return {"frequency": math.pi, "pairs": 1}
 
 
+def doubles(point: Any) -> bool:
+    """Return whether `doubled` orbits leave a point: a period doubling, or a branch point at which a symmetry breaks."""
+    return point.label == Label.PERIOD_DOUBLING or (point.label == Label.BRANCH_POINT and isinstance(point.details, dict))
+
+
 def doubled(system: PeriodicEquations | MapEquations, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a cycle comes to go twice round one of half its period.
 
     Beyond it the branch is itself, half a period on.
     """
-    if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
+    found = point.label == Label.BRANCH_POINT and finding_of(point.details).is_branch_point
+    if not found or not system.is_doubled(point.trial.x):
         return point
     stop = Stop(Reason.PERIOD_DOUBLING, "the cycles come to go twice round cycles of half the period, at a period doubling")
-    return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
+    return dataclasses.replace(point, label=Label.PERIOD_DOUBLING, name="period doubling", stop=stop)
 
 
 def _may_double(arc: Arc) -> bool:
@@ -280,7 +287,7 @@ def critical_angle(system: PeriodicEquations | MapEquations, point: Any, x: Arra
 
 def torus() -> Event:
     """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
-    return Event("TR", "torus", hopf().function, search=_tori, asks=_may_twist, normal_form=pair)
+    return Event(Label.TORUS, "torus", hopf().function, search=_tori, asks=_may_twist, normal_form=pair)
 
 
 def _may_twist(arc: Arc) -> bool:

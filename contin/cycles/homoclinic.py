@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.core.labels import Label
 from contin.core.newton import correct
 from contin.core.state import Stop
 from contin.core.trial import Event, Trial, linearization
@@ -81,7 +82,7 @@ def _number(value: complex) -> str:
 @functools.cache  # one for all runs
 def homoclinic() -> Event:
     """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
-    return Event("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD, still=STILL)
+    return Event(Label.END, "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD, still=STILL)
 
 
 def _liveliness(trial: Trial) -> float:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial
 from contin.cycles.equations import CycleEquations
@@ -39,7 +40,7 @@ _ON_AXIS = 1e-9
 
 
 #: The size of a cycle as a part of an earlier one of the run, with a sign.
-AMPLITUDE = Event("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
+AMPLITUDE = Event(Label.HOPF, "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
 def hopf_point_inside(system: CycleEquations, arc: Arc) -> SpecialPoint | None:
@@ -57,7 +58,7 @@ def hopf_point_inside(system: CycleEquations, arc: Arc) -> SpecialPoint | None:
     stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
     sizes = dict(zip(system.free, map(float, error * system.free_scales)))
-    return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)
+    return SpecialPoint(at, Label.HOPF, "Hopf", there, stop, details, errors=sizes)
 
 
 def shrunk(system: CycleEquations, point: SpecialPoint) -> SpecialPoint:
@@ -68,7 +69,7 @@ def shrunk(system: CycleEquations, point: SpecialPoint) -> SpecialPoint:
     if not system.has_shrunk(point.trial.x):
         return point
     stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
-    return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
+    return dataclasses.replace(point, label=Label.HOPF, name="Hopf", stop=stop)
 
 
 def _hopf_point(system: CycleEquations, guess: Array) -> tuple[Array, float, Array]:

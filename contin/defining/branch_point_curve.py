@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.defining.system import Defining
 from contin.events.bordered import BorderedMatrix, bordered_at
 
@@ -27,7 +28,7 @@ class BranchPointCurve(Defining):
         With one free parameter more than a curve of solutions needs: the last one is the second parameter.
     """
 
-    kind = "BP"
+    kind = Label.BRANCH_POINT
     own_equations, own_unknowns = 2, 1
 
     def computed(self, x: Array) -> BorderedMatrix:

@@ -23,6 +23,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.differences import derivative
+from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
@@ -113,7 +114,7 @@ class EventCurve(Defining):
             for test in others
         ]
         name = f"the end of {self.event.name!r}, whose confirm returns False"
-        ends = [Event("EP", name, _confirmed, terminal=True)] if self.event.confirm else []
+        ends = [Event(Label.END, name, _confirmed, terminal=True)] if self.event.confirm else []
         return [*super().events(), *ends, *inside]
 
     def judged(self, point: SpecialPoint) -> SpecialPoint:

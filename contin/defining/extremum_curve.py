@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import cast
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
@@ -63,5 +64,5 @@ class ExtremumCurve(Defining):
 
         name = self.objective
         return [
-            Event("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name), *super().events()
+            Event(Label.EXTREMUM, name, slope, describe=lambda trial: curvatures(trial, name), column=name), *super().events()
         ]  # fmt: skip

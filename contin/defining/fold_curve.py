@@ -18,6 +18,7 @@ from typing import cast
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.arc import Arc, SpecialPoint
@@ -38,7 +39,7 @@ class FoldCurve(Defining):
         With one free parameter more than a curve of solutions needs: the first is the one of the folds.
     """
 
-    kind = "LP"
+    kind = Label.FOLD
 
     def computed(self, x: Array) -> Bordered:
         """Return the bordered matrix: both parameters, and those that fix the solution besides, stay where they are."""
@@ -128,10 +129,10 @@ def _singular_point(arc: Arc) -> list[SpecialPoint] | None:
 
 #: w.F_zz v v = 0.
 _CUSP: Event = Event(
-    "CP", "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [], asks=lambda arc: arc.passes(_CUSP)
+    Label.CUSP, "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [], asks=lambda arc: arc.passes(_CUSP)
 )
 #: Where the fold meets a branch point: w.F_lambda = 0.
 _MEETS: Event = Event(
-    "BP", "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc),
+    Label.BRANCH_POINT, "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc),
     asks=lambda arc: arc.passes(_MEETS),
 )  # fmt: skip

@@ -24,6 +24,7 @@ import numpy as np
 from contin.arrays import Array, Function
 from contin.collocation.mesh import MeshControl
 from contin.collocation.switching import Switching
+from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
@@ -159,7 +160,7 @@ class Defining(Discretization):
             return float(system.base.amplitude(system.inside(trial.x))) - _SHRUNK
 
         name = "the end, near a Hopf point where the cycles have no size"
-        return [Event("EP", name, amplitude, terminal=True)] if self.base.size_of_solutions is not None else []
+        return [Event(Label.END, name, amplitude, terminal=True)] if self.base.size_of_solutions is not None else []
 
     @property
     def nodes(self) -> Array:

@@ -6,8 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import other_pairs
+
+#: The kind of curves of homoclinic orbits, which leave from the first.
+HOMOCLINIC = "homoclinic"
 
 
 def events_on_folds() -> list[Event]:
@@ -26,6 +30,6 @@ def events_on_folds() -> list[Event]:
         return other_pairs(np.delete(values, np.argmin(np.abs(values))))
 
     return [
-        Event("BT", "Bogdanov-Takens", double_zero),
-        Event("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
+        Event(Label.BOGDANOV_TAKENS, "Bogdanov-Takens", double_zero),
+        Event(Label.ZERO_HOPF, "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
     ]

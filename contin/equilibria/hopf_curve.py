@@ -20,6 +20,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve, degenerate, other_pairs, signed_smallest
 from contin.equilibria.equations import AlgebraicEquations
@@ -36,7 +37,7 @@ T = TypeVar("T")
 class HopfCurve(CriticalCurve):
     """Hopf points of an `Algebraic` system made by `as_field`; columns ``frequency`` and ``lyapunov`` (l1)."""
 
-    kind = "HB"
+    kind = Label.HOPF
     own_equations, own_unknowns = 2, 1
     own_columns = ("frequency", "lyapunov")
 
@@ -76,13 +77,13 @@ class HopfCurve(CriticalCurve):
             return lambda trial: function(cast(HopfCurve, trial.system), trial.x)
 
         found = [
-            Event("BT", "Bogdanov-Takens", of_curve(lambda curve, x: curve.kappa(x) / curve.kappa_size), terminal=True),
-            degenerate("GH", "generalized Hopf"),
+            Event(Label.BOGDANOV_TAKENS, "Bogdanov-Takens", of_curve(HopfCurve.kappa), terminal=True),
+            degenerate(Label.GENERALIZED_HOPF, "generalized Hopf"),
         ]
         if self.base.state_size > 2:
             found += [
-                Event("ZH", "zero-Hopf", of_curve(lambda curve, x: signed_smallest(curve.others(x)))),
-                Event("HH", "double Hopf", of_curve(lambda curve, x: other_pairs(curve.others(x))[0]),
+                Event(Label.ZERO_HOPF, "zero-Hopf", of_curve(lambda curve, x: signed_smallest(curve.others(x)))),
+                Event(Label.DOUBLE_HOPF, "double Hopf", of_curve(lambda curve, x: other_pairs(curve.others(x))[0]),
                       confirm=of_curve(lambda curve, x: other_pairs(curve.others(x))[1])),
             ]  # fmt: skip
         return found

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.trial import Event
 from contin.equilibria.dependence import dependence
 from contin.equilibria.equations import AlgebraicEquations
-from contin.equilibria.folds import events_on_folds
+from contin.equilibria.folds import HOMOCLINIC, events_on_folds
 from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import critical_pair, form_of
 from contin.events.arc import SpecialPoint
@@ -42,7 +43,12 @@ class Algebraic(AlgebraicEquations):
     """
 
     #: Kinds of curves in two parameters that begin at, or pass, points of codimension two.
-    leaving = {"BT": ("LP", "HB", "homoclinic"), "GH": ("LP",), "ZH": ("LP", "HB", "TR"), "HH": ("HB", "TR")}
+    leaving = {
+        Label.BOGDANOV_TAKENS: (Label.FOLD, Label.HOPF, HOMOCLINIC),
+        Label.GENERALIZED_HOPF: (Label.FOLD,),
+        Label.ZERO_HOPF: (Label.FOLD, Label.HOPF, Label.TORUS),
+        Label.DOUBLE_HOPF: (Label.HOPF, Label.TORUS),
+    }
 
     def events(self) -> list[Event]:
         """Return the test function of Hopf points, where the states move in time."""

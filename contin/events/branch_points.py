@@ -12,6 +12,7 @@ import functools
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.core.labels import Label
 from contin.core.protocol import inner
 from contin.core.trial import Trial, sign_changed
 from contin.errors import ConvergenceError
@@ -165,7 +166,7 @@ class BranchPointSearch:
                 inside = arc.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
                 if inside and found.gap < self._gap and arc.passes_by(found.x, at):
                     found = found.along(state.system, arc.direction(at))
-                    return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
+                    return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:
                 pass
             try:
@@ -174,7 +175,7 @@ class BranchPointSearch:
                 break
             low, high = (middle, high) if sign == arc.before.sign else (low, middle)
             middle = (low + high) / 2
-        return SpecialPoint(high, "BP", "", trial, is_located=False)
+        return SpecialPoint(high, Label.BRANCH_POINT, "", trial, is_located=False)
 
     @functools.cached_property
     def multiple(self) -> SpecialPoint:
@@ -189,10 +190,10 @@ class BranchPointSearch:
                 at = inner(state.system, state.tangent, found.x - state.x)
                 if arc.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
                     trial = Trial.without_tangent(state.system, found.x)
-                    return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
+                    return SpecialPoint(at, Label.BRANCH_POINT, f"kernel of dimension {found.dimension}", trial, details=found)
         kernel = smallest_directions(arc.trial.factors, state.system.size, count + 1)[0][:count]
         kernel = canonical_basis(kernel, state.system.weights)
-        return SpecialPoint(step, "BP", "", arc.trial, details=MultiplePoint(count, kernel), is_located=False)
+        return SpecialPoint(step, Label.BRANCH_POINT, "", arc.trial, details=MultiplePoint(count, kernel), is_located=False)
 
     def _apart(self, middle: float) -> bool:
         """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.

@@ -20,6 +20,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.differences import derivative
+from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
@@ -125,7 +126,7 @@ def extremum(column: str) -> Event:
         gradient = system.column_gradient(trial.x, column)
         return _difference(trial, column) if gradient is None else float(gradient @ trial.tangent)
 
-    return Event("EX", column, slope, describe=lambda trial: curvatures(trial, column), column=column)
+    return Event(Label.EXTREMUM, column, slope, describe=lambda trial: curvatures(trial, column), column=column)
 
 
 def _difference(trial: Trial, column: str) -> float:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -50,7 +51,7 @@ def hopf() -> Event:
         parts = values[_is_complex(values)].real
         return float(parts.max()) if parts.size else float("nan")
 
-    return Event("HB", "Hopf", function, search=hopf_points, asks=may_pass, normal_form=pair)
+    return Event(Label.HOPF, "Hopf", function, search=hopf_points, asks=may_pass, normal_form=pair)
 
 
 def may_pass(arc: Arc) -> bool:
@@ -70,7 +71,7 @@ def _nearest(value: complex) -> Event:
         values = _upper(trial)
         return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
-    return Event("HB", "Hopf", function, search=hopf_points, normal_form=pair)
+    return Event(Label.HOPF, "Hopf", function, search=hopf_points, normal_form=pair)
 
 
 def _upper(trial: Trial) -> ComplexArray:

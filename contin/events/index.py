@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from contin.core.labels import SINGULAR
 from contin.core.trial import Event
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import finding_of
@@ -35,6 +36,6 @@ class Stability:
 
 def nullity_of(point: SpecialPoint) -> int:
     """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
-    if point.label not in ("LP", "BP", "CP") and not point.is_trivial:
+    if not (point.label in SINGULAR or point.is_trivial):
         return 0
     return finding_of(point.details).nullity

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import SINGULAR, Label
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, Stop
@@ -137,7 +138,7 @@ class Inspection:
             return ""
         for point in self.special_points(tests):
             ends = point.stop is not None and not (point.test is not None and point.test.limit)
-            if point.is_located and (point.label == "BP" or ends):
+            if point.is_located and (point.label == Label.BRANCH_POINT or ends):
                 return ""
         return "" if self.branch_points.simple.is_located else _STRAYS
 
@@ -307,13 +308,13 @@ class Inspection:
         if not self.settings.branch_points or self.branch_points.sign_changes:
             point = self.branch_points.simple
             if self._is_home(point):
-                return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
-        test = Event("EP", "trivial branch", lambda there: there[name], terminal=True)
+                return dataclasses.replace(point, label=Label.END, name="trivial branch", stop=stop)
+        test = Event(Label.END, "trivial branch", lambda there: there[name], terminal=True)
         point = arc.locate(test, (arc.low, before), (arc.step, trial))
         if self._is_home(point):
             return dataclasses.replace(point, stop=stop)
         stop = Stop(Reason.NO_CONVERGENCE, f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
-        return SpecialPoint(arc.step, "MX", "trivial branch", trial, stop, is_located=False)
+        return SpecialPoint(arc.step, Label.FAILED, "trivial branch", trial, stop, is_located=False)
 
     def _is_home(self, point: SpecialPoint) -> bool:
         """Return whether the trivial quantity vanishes at a point on the branch."""
@@ -357,15 +358,15 @@ class Inspection:
         if np.sqrt(inner(state.system, off, off)) > _BACK * step:
             return None
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
-        return SpecialPoint(at, "EP", "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))
+        return SpecialPoint(at, Label.END, "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))
 
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
         """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
 
         Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
         """
-        others = [other for other in found if other.label in ("BP", "CP") or other is self._home or other.turns_back]
-        if fold.label != "LP" or not others:
+        others = [other for other in found if other.label in SINGULAR or other is self._home or other.turns_back]
+        if not others:
             return False
         if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
             return True
@@ -427,7 +428,7 @@ def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
 
     Others stay as given.
     """
-    ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != "LP")
+    ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != Label.FOLD)
     rank = {id(point): number for number, point in enumerate(ranked)}
     along = sorted(ranked, key=lambda point: point.at)
     groups: list[list[SpecialPoint]] = []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.labels import Label
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.settings import Settings
@@ -125,8 +126,8 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, se
         return errors
     if test is None:
         primary = settings.primary or system.free[0]
-        test = Event("EP", "start", lambda trial: trial[primary])
-    if test.label != "LP":
+        test = Event(Label.END, "start", lambda trial: trial[primary])
+    if test.label != Label.FOLD:
         size = float(np.abs(along).max())
         slope = _change(test, trial, along * (_ASIDE / size)) * size
         for move in moves:
@@ -176,7 +177,7 @@ def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discret
         It was not found, or another one was.
     """
     system, carry = finer
-    known = _NEAREST if details is None and point.label == "BP" and point.test is None else finding_of(details)
+    known = _NEAREST if details is None and point.label == Label.BRANCH_POINT and point.test is None else finding_of(details)
     if known.has_equations:
         found = known.again(system, carry, trial.x, newton)
         return found.there(system, carry(trial.tangent)), found, 0.0
@@ -235,7 +236,7 @@ def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | N
         if abs(s - last) < _LAST:
             return trial, 0.0
         value = test.function(trial)
-        if test.label == "LP" and max(abs(before), abs(value)) < _FLAT:
+        if test.label == Label.FOLD and max(abs(before), abs(value)) < _FLAT:
             return trial, 0.0  # the parameter stands still all around: its value there is that of the fold
         if value == before:
             break  # it does not depend on the place, and is not zero

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 
+from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.events import normal_forms
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -25,7 +26,7 @@ def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[Event]:
 
 
 def _user_zero(name: str, value: float, text: str) -> Event:
-    return Event("UZ", f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
+    return Event(Label.USER_ZERO, f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
 
 
 def limits(intervals: Mapping[str, Sequence[float]]) -> list[Event]:
@@ -43,7 +44,7 @@ def _limit(name: str, value: float, text: str, side: int) -> Event:
     def function(trial: Trial) -> float:
         return side * (trial[name] - value)
 
-    return Event("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
+    return Event(Label.END, f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
 
 
 def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
@@ -65,7 +66,7 @@ def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -
 
 def fold(name: str) -> Event:
     """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
-    return Event("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name,
+    return Event(Label.FOLD, name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name,
                  normal_form=normal_forms.fold)  # fmt: skip
 
 
@@ -79,5 +80,6 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
     value = {} if found.is_meaningless(error) else {"normal_form": found.value}
     details = {**(point.details or {}), **value, "normal_form_error": error}
     attracts, repels = found.side * found.value < -error, found.side * found.value > error
-    kind = ", supercritical" if attracts else ", subcritical" if repels else ""
-    return dataclasses.replace(point, name=point.name + kind * (point.label != "LP"), details=details)
+    is_fold = point.test is not None and point.test.normal_form is normal_forms.fold
+    kind = "" if is_fold else ", supercritical" if attracts else ", subcritical" if repels else ""
+    return dataclasses.replace(point, name=point.name + kind, details=details)

@@ -25,6 +25,7 @@ from contin.core.trial import linearization
 from contin.cycles.curves import TorusCurve
 from contin.defining.fold_curve import FoldCurve
 from contin.defining.system import Defining
+from contin.equilibria.folds import HOMOCLINIC
 from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import critical_pair
 from contin.equilibria.system import Algebraic
@@ -61,7 +62,7 @@ def leaving(start: Point, kind: str, branch: int) -> First:
         raise ProblemError(f"kind: {kind!r} must be one of the curves that leave from the start, {known}")
     base, x = _equilibrium(start)
     frequencies = _frequencies(start, base, x)
-    if kind == "homoclinic":
+    if kind == HOMOCLINIC:
         return _homoclinic(base, x)
     if kind == Label.HOPF:
         return _hopf_points(base, x, frequencies[-1] if frequencies else 0.0)

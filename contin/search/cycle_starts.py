@@ -14,6 +14,7 @@ from contin.collocation.degree import CYCLE_DEGREE
 from contin.collocation.mesh import MeshControl
 from contin.core.labels import Label
 from contin.core.scales import usual
+from contin.cycles.floquet import doubles
 from contin.cycles.maps import MapSystem
 from contin.cycles.statement import CycleProblem
 from contin.cycles.system import CycleCollocation, PeriodicCollocation
@@ -21,7 +22,7 @@ from contin.equilibria.lyapunov import CriticalPair, critical_pair
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.events.labelled import doubles, frequency_of
+from contin.events.labelled import frequency_of
 from contin.problems.angles import windings
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
