@@ -20,7 +20,7 @@ OUT = ROOT / "docs" / "images" / "rooms.svg"
 #: The modules beside the rooms: drawn as one box.
 FOUNDATION = "errors · arrays · checks · files"
 PURPOSE = {
-    "search": "first solutions, runs from points, curves, diagrams, sensitivities",
+    "search": "first solutions, runs from points, curves, diagrams",
     "continuation": "the loop: predict, correct, watch, locate, accept",
     "results": "points, branches, files, tables, plots",
     "connections": "homoclinic and heteroclinic orbits",

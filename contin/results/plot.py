@@ -86,7 +86,7 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     piece : slice
         Points of the piece; its ends belong to the pieces beside it too.
     """
-    moving = bool(points) and _unstable(points[0]) is not None
+    moving = bool(points) and points[0].system.unstable(points[0].x) is not None
     if len(points) < 2 or (not moving and all(point.index is None for point in points)):
         yield None, slice(None)
         return
@@ -102,17 +102,12 @@ def _of_motions(points: Sequence[Point]) -> list[bool | None]:
 
     The regular point at one end decides; between two special points, the step before.
     """
-    counts = [None if point.label in _CRITICAL else _unstable(point) for point in points]
+    counts = [None if point.label in _CRITICAL else point.system.unstable(point.x) for point in points]
     found: list[bool | None] = []
     for a, b in pairwise(counts):
         count = b if a is None else a
         found.append((found[-1] if found else None) if count is None else count == 0)
     return found
-
-
-def _unstable(point: Point) -> int | None:
-    """Return the number of unstable multipliers, or eigenvalues; None where it is not known."""
-    return point.system.unstable(point.x)
 
 
 def _stable(a: Point, b: Point) -> bool | None:
@@ -144,19 +139,11 @@ def column(points: Sequence[Point], name: str) -> Array:
 
     The norm is the root mean square of the states over the nodes.
     """
-    if points and (name in points[0].parameters or name in points[0].functionals):
+    if points and name in (*points[0].parameters, *points[0].functionals, *points[0].system.named_states):
         return np.array([point[name] for point in points])
-    if points and name in _states(points[0]):
-        at = _states(points[0]).index(name)
-        return np.array([point.system.states(point.x).ravel()[at] for point in points])
     if name in ("arclength", "discretization_error"):
         return np.array([getattr(point, name) for point in points])
     return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
-
-
-def _states(point: Point) -> tuple[str, ...]:
-    """Return the states that are columns: those of an algebraic problem."""
-    return point.system.named_states
 
 
 def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, list[str], str]:
@@ -164,7 +151,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *_states(first)]
+    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *first.system.named_states]
     x = first.system.free[0] if x is None else x
     states = first.system.problem.states if first.system.is_cycle and first.system.intervals else ()
     y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y
