@@ -40,12 +40,8 @@ class Request(NamedTuple):
     packed: bool = False
 
 
-class _Made(NamedTuple):
-    """A program with the number of its values, and the shape of its Jacobian at one point; empty without one."""
-
-    program: Program
-    values: int
-    jacobian: tuple[int, ...]
+#: A program, the number of its values, and the shape of its Jacobian at one point; empty without one.
+_Made = tuple[Program, int, tuple[int, ...]]
 
 
 class Recorded:
@@ -91,7 +87,7 @@ class Recorded:
     def describe(self) -> str:
         """Return one line: how many operations there are."""
         every = Request(tuple(range(self._signature.inputs)))
-        values, both = (self._made(request).program.operations for request in (Request(), every))
+        values, both = (self._made(request)[0].operations for request in (Request(), every))
         return f"recorded, {values} operations, {both} with all first derivatives"
 
     def text(self, labels: Sequence[str], time: str) -> list[str]:
@@ -142,7 +138,7 @@ class Recorded:
     def load(self, request: Request) -> Loaded:
         """Return the program as kernels run it."""
         sizes = np.empty(0) if self._sizes is None else self._sizes
-        return load(self._made(request).program, len(self._signature.parameters), sizes)
+        return load(self._made(request)[0], len(self._signature.parameters), sizes)
 
     def function(self, places: Sequence[int]) -> Callable[[Array, Array, Array], Array]:
         """Return the function ``(t, u, p)`` of the values of operations on the tape, shape (points, places)."""
@@ -180,7 +176,7 @@ class Recorded:
             at = range(len(found)) if packed else [row * len(inputs) + column for row, column in found]
             stores += [(place, Slope(number)) for place, number in zip(places, at)]
             shape = (1, len(found)) if packed else (1 if weighted else len(results), len(inputs))
-        return _Made(program(self.recording.tape, stores, self._inputs(order, weighted)), count, shape)
+        return program(self.recording.tape, stores, self._inputs(order, weighted)), count, shape
 
     def _slopes(self, inputs: tuple[int, ...]) -> dict[tuple[int, int], int]:
         """Return the places of the derivatives that are not zero everywhere, by value and column."""
