@@ -258,6 +258,13 @@ def _root_of_pair(apply: Callable[..., Any], x: Any, y: Any) -> tuple[Any, Any]:
     return apply("select", left, abs(other), part), apply("select", left, sign * part, other)
 
 
+def _tan_of_pair(apply: Callable[..., Any], x: Any, y: Any) -> tuple[Any, Any]:
+    """Return the tangent, and with exchanged parts the hyperbolic one; nothing cancels near a pole."""
+    sin, cos, sinh, cosh = apply("sin", x), apply("cos", x), apply("sinh", y), apply("cosh", y)
+    square = cos * cos + sinh * sinh
+    return sin * cos / square, sinh * cosh / square
+
+
 def _of_angle(y: Any, x: Any) -> tuple[Any, Any]:
     square = x * x + y * y
     return x / square, -y / square
@@ -316,7 +323,7 @@ TABLE: dict[str, Primitive] = {
         np.cos, "cos", lambda tape, x, r: -tape.apply("sin", x),
         lambda f, x, y: (f("cos", x) * f("cosh", y), -f("sin", x) * f("sinh", y)),
     ),
-    "tan": _library(np.tan, "tan", lambda tape, x, r: 1.0 + r * r),
+    "tan": _library(np.tan, "tan", lambda tape, x, r: 1.0 + r * r, _tan_of_pair),
     "asin": _library(np.arcsin, "asin", lambda tape, x, r: 1.0 / tape.apply("sqrt", 1.0 - x * x)),
     "acos": _library(np.arccos, "acos", lambda tape, x, r: -1.0 / tape.apply("sqrt", 1.0 - x * x)),
     "atan": _library(np.arctan, "atan", lambda tape, x, r: 1.0 / (1.0 + x * x)),
@@ -328,7 +335,7 @@ TABLE: dict[str, Primitive] = {
         np.cosh, "cosh", lambda tape, x, r: tape.apply("sinh", x),
         lambda f, x, y: (f("cosh", x) * f("cos", y), f("sinh", x) * f("sin", y)),
     ),
-    "tanh": _library(np.tanh, "tanh", lambda tape, x, r: 1.0 - r * r),
+    "tanh": _library(np.tanh, "tanh", lambda tape, x, r: 1.0 - r * r, lambda f, x, y: _tan_of_pair(f, y, x)[::-1]),
     "asinh": _library(np.arcsinh, "asinh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x + 1.0)),
     "acosh": _library(np.arccosh, "acosh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x - 1.0)),
     "atanh": _library(np.arctanh, "atanh", lambda tape, x, r: 1.0 / (1.0 - x * x)),

@@ -42,17 +42,12 @@ def function_of_complex(name: str, value: Any) -> Any:
     Unrecordable
         The operation of this name has no rule for it.
     """
-    if isinstance(value, ComplexNumber):
-        return value.function(name)
-    if TABLE[name].pair is None and name not in _QUOTIENTS:
+    pair = TABLE[name].pair
+    if pair is None:
         raise Unrecordable(f"it calls {name} of a complex number")
-    return getattr(cmath, name)(value)
-
-
-#: Functions that are quotients of two others.
-_QUOTIENTS = {"tan": ("sin", "cos"), "tanh": ("sinh", "cosh")}
-#: Names of the functions of complex numbers.
-COMPLEX = [*(name for name, each in TABLE.items() if each.pair), *_QUOTIENTS]
+    if not isinstance(value, ComplexNumber):
+        return getattr(cmath, name)(value)
+    return ComplexNumber(value.tape, *pair(value.tape.apply, value.real, value.imag))
 
 
 def _binary(function: Callable[[ComplexNumber, ComplexNumber], Any], swapped: bool = False) -> Any:
@@ -96,7 +91,7 @@ def _power(a: ComplexNumber, b: ComplexNumber) -> Any:
     known = b.real.known
     if b.imag.known == 0 and known is not None and known == round(known) and abs(known) <= LARGEST_POWER:
         return whole_power(complex_number(a.tape, 1.0), a, int(known))
-    return _product(b, a.function("log")).function("exp")
+    return function_of_complex("exp", _product(b, function_of_complex("log", a)))
 
 
 class ComplexNumber:
@@ -118,16 +113,6 @@ class ComplexNumber:
     def conjugate(self) -> ComplexNumber:
         """Return the number with the other sign of its imaginary part."""
         return ComplexNumber(self.tape, self.real, -self.imag)
-
-    def function(self, name: str) -> ComplexNumber:
-        """Return a function of this number, by the name of the operation of real ones."""
-        if name in _QUOTIENTS:
-            over, under = map(self.function, _QUOTIENTS[name])
-            return _quotient(over, under)
-        pair = TABLE[name].pair
-        if pair is None:
-            raise Unrecordable(f"it calls {name} of a complex number")
-        return ComplexNumber(self.tape, *pair(self.tape.apply, self.real, self.imag))
 
     __add__ = __radd__ = _binary(_sum)
     __sub__, __rsub__ = _binary(_difference), _binary(_difference, swapped=True)

@@ -33,7 +33,7 @@ from contin.functions.recorded_arrays import (
     smallest,
     tabulated,
 )
-from contin.functions.recorded_complex import COMPLEX, ComplexNumber, complex_number, function_of_complex
+from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Unrecordable
@@ -336,7 +336,7 @@ _OF_NUMBERS |= {
     math.fmod: lambda x, y: x - y * operation("trunc")(x / y), cmath.phase: FUNCTIONS[np.angle],
     cmath.rect: lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi)),
 }  # fmt: skip
-_OF_NUMBERS |= {getattr(cmath, name): _of_complex(name) for name in COMPLEX}
+_OF_NUMBERS |= {getattr(cmath, name): _of_complex(name) for name, each in TABLE.items() if each.pair}
 #: Functions of NumPy that make an array of what they are given, and those that make a new one.
 _CONVERTERS = (np.array, np.asarray, np.asanyarray, np.ascontiguousarray)
 _MAKERS = (np.zeros, np.empty, np.ones, np.full, np.zeros_like, np.empty_like, np.ones_like, np.full_like, *_CONVERTERS)
