@@ -1,0 +1,131 @@
+"""One road for closed and open strips: columns stated once, stages, what an interrupted run and a law's end become."""
+
+import dataclasses
+import json
+import signal
+
+import h5py
+import numpy as np
+import pytest
+
+from branches.explore.gather import gather
+from branches.graph.kinds import graph_kind
+from branches.graph.stored import save
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.closed_stage import ClosedStage
+from branches.scene.columns import FOUND, Column, error_of
+from branches.scene.parse import load, parse
+from branches.scene.stages import stages_of
+from branches.store.read import read_branch
+
+COARSE = "mesh: {degree: 5, tolerance: 1.0e-7}\n"
+
+
+def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
+    """It is in the file with its words and its error, in the graph, on the page, and on the axes of pictures."""
+    usual = ClosedStage.columns
+
+    def columns(self):
+        found = usual(self)
+        twice = Column("twice", "twice the energy", error=error_of("energy"), role=FOUND, axis="twice the energy",
+                       value=lambda row: 2 * row.values["energy"])  # fmt: skip
+        return dataclasses.replace(found, values=(*found.values, twice))
+
+    monkeypatch.setattr(ClosedStage, "columns", columns)
+    scene = parse(f"m: 1\nn: 2\n{COARSE}", "scene")
+    assert run_scene(scene, tmp_path / "x.h5", Display(silent=True)) == "complete"
+    branch = read_branch(tmp_path / "x.h5")
+    assert np.array_equal(branch.points["twice"], 2 * branch.points["energy"])
+    assert branch.events["error_twice"].tolist() == branch.events["error_energy"].tolist()
+    with h5py.File(tmp_path / "x.h5") as file:
+        assert file["points"].attrs["twice"] == "twice the energy"
+    kind = graph_kind(scene)
+    graph = kind.new()
+    kind.add(graph, kind.part(branch, "x.h5", {}))
+    assert all(np.allclose(edge["twice"], 2 * np.array(edge["energy"])) for *_, edge in graph.edges(data=True))
+    save(graph, tmp_path)
+    assert "twice" in json.loads((tmp_path / "diagram.json").read_text())["edges"][0]
+    page = gather([str(tmp_path / "x.h5")])
+    assert ("twice", "twice the energy", "twice") in page["axes"]
+    assert "twice" in page["families"][0]["branches"][0]["columns"]
+    (axes,) = branch.plot(shapes=0, x="kappa_n", y="twice").axes
+    assert axes.get_ylabel() == "twice the energy"
+
+
+def test_a_column_that_follows_from_others_is_in_no_file(tmp_path):
+    run_scene(parse(f"m: 1\nn: 2\n{COARSE}", "scene"), tmp_path / "x.h5", Display(silent=True))
+    branch = read_branch(tmp_path / "x.h5")
+    assert "elastic" not in branch.points.dtype.names
+    assert np.allclose(branch.column("elastic"), branch.points["energy"] + branch.points["kappa_n"] ** 2 / 2)
+    (axes,) = branch.plot(shapes=0, y="elastic").axes
+    assert "elastic energy" in axes.get_ylabel()
+
+
+@pytest.mark.parametrize("text", ["m: 1\nn: 2\nstability: true\n", None])
+def test_every_column_has_words_of_its_own_kind(text, root):
+    scene = load(root / "configs" / "open_release.yaml") if text is None else parse(text, "scene")
+    columns = stages_of(scene)[0].columns()
+    for name, (_, words, _) in columns.table("events").items():
+        assert len(words) > len(name) and words != name, name
+    assert ("2 pi" in columns.all["energy"].words) == (text is not None)
+
+
+def test_errors_of_what_is_found_cover_the_exact_values(tmp_path):
+    """On the m-fold circle kappa* is m and the energy m^2/2 - m kappa_n; the ends of (1, 2) are at 2.5 and -1/2."""
+    run_scene(parse("m: 1\nn: 2\n", "scene"), tmp_path / "x.h5", Display(silent=True))
+    first, fold, last = read_branch(tmp_path / "x.h5").events
+    for event, m, kappa_n in ((first, 1, 2.5), (last, 3, -0.5)):
+        assert abs(event["kappa_star"] - m) <= event["error_kappa_star"] < 1e-12
+        assert abs(event["energy"] - (m**2 / 2 - m * kappa_n)) <= event["error_energy"] < 1e-12
+    assert 0 < fold["error_kappa_star"] < 1e-10 and 0 < fold["error_energy"] < 1e-10
+
+
+class Interrupts(Display):
+    """Ctrl-C is pressed at a point."""
+
+    def __init__(self, at):
+        super().__init__(silent=True)
+        self.at = at
+
+    def point(self, stage, point, number, step):
+        if number == self.at:
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_a_run_goes_on_in_a_stage_with_other_ends_to_the_same_bits(tmp_path, root, tables):
+    scene = load(root / "configs" / "open_release.yaml")
+    whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
+    run_scene(scene, whole, Display(silent=True))
+    at = int(np.flatnonzero(read_branch(whole).points["stage"] == 4)[2])
+    assert run_scene(scene, parts, Interrupts(at)) == "interrupted"
+    assert run_scene(scene, parts, Display(silent=True), resume=True) == "complete"
+    assert tables(parts) == tables(whole)
+
+
+def test_a_secondary_branch_goes_on_without_its_primary_branch(tmp_path, monkeypatch):
+    text = (
+        "m: 3\nn: 1\norigin: {kappa_n: -21.62681748, kappa_star: 2.78375737, mode: wavenumber 1 even}\ndomain: half loop\n"
+        "mesh: {degree: 5}\nlimits: {kappa_n: [-30, 20]}\n"
+    )
+    path = tmp_path / "x.h5"
+    assert run_scene(parse(text, "scene"), path, Interrupts(4)) == "interrupted"
+    monkeypatch.setattr("branches.scene.closed_stage.seed", None)  # it followed the primary branch
+    assert run_scene(parse(text, "scene"), path, Display(silent=True), resume=True) == "complete"
+
+
+def test_the_end_of_a_law_ends_a_stage_and_no_later_one_starts(tmp_path):
+    text = 'material: {law: ribbon, nu: 0.3, kappa_n: 1}\nalong: {thickness: "1 - s/2"}\nfinish: free\n'
+    stages = "stages: [{follow: force_normal, to: 5}, {follow: force_normal, to: 0}]\n"
+    assert run_scene(parse(text + stages, "scene"), tmp_path / "x.h5", Display(silent=True)) == "complete"
+    branch = read_branch(tmp_path / "x.h5")
+    assert set(branch.points["stage"]) == {1} and branch.stop.startswith("stage 1: the end of the law")
+
+
+def test_any_column_of_an_open_strip_against_any_other(tmp_path, root):
+    run_scene(load(root / "configs" / "open_tip.yaml"), tmp_path / "x.h5", Display(silent=True))
+    branch = read_branch(tmp_path / "x.h5")
+    (axes,) = branch.plot(shapes=0, x="energy", y="M_normal").axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("energy", "moment about the normal")
+    with pytest.raises(Exception, match="there is no column 'M_up' of numbers"):
+        branch.plot(shapes=0, y="M_up")
