@@ -64,8 +64,7 @@ def main(argv=None) -> int:
 
 def _scenes() -> int:
     """List the scenes of the package with their titles."""
-    from branches.scene.packaged import scenes
-    from branches.scene.text import read
+    from branches.scene.parse import read, scenes
     from branches.store.command import write_output
 
     titles = {file.stem: read(file.read_text(encoding="utf-8"), file.name).get("title", "") for file in scenes()}

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from branches.graph import closed, open_strips
 from branches.graph.stored import CLOSED_FORMAT, OPEN_FORMAT, new_graph
-from branches.scene.scene import Scene
+from branches.scene.fields import Scene
 from branches.scene.sweep import Sweep
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED, OPEN

@@ -13,8 +13,8 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.stored import new_graph
+from branches.scene.fields import Scene
 from branches.scene.labels import kind_of
-from branches.scene.scene import Scene
 from branches.scene.sweep import Sweep
 from contin.lowlevel import exact_text
 from ribbon_model import exact

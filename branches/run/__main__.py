@@ -60,8 +60,7 @@ def main(argv=None) -> int:
 
 def _run(options) -> int:
     from branches.scene.fields import ConfigError
-    from branches.scene.packaged import found
-    from branches.scene.parse import load
+    from branches.scene.parse import found, load
 
     options.config = found(options.config)
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from branches.store.command import write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
-    from branches.scene.scene import Scene
+    from branches.scene.fields import Scene
     from branches.scene.stage import Stage
     from contin import Point, Stop
 
@@ -78,14 +78,11 @@ class Display:
             except OSError:
                 self._moving = False  # the terminal is gone; the run is not
 
-    def summary(self, scene: Scene, events, count: int, seconds: float, path, outcome: str, stop: Stop | None) -> None:
+    def summary(self, stages: list[Stage], events, count: int, seconds: float, path, outcome: str, stop: Stop | None) -> None:
         """What came out, in lines to quote; ``events`` are rows of the result's table of labelled points."""
         self.clear()
         lines = [] if self._quiet else [""]
-        lines.append(f"{scene.title_or_name}: {count} points in {seconds:.2f} s")
-        from branches.scene.stages import stages_of  # loaded by then
-
-        stages = stages_of(scene)
+        lines.append(f"{stages[0].scene.title_or_name}: {count} points in {seconds:.2f} s")
         lines += [f"  {text}" for stage in stages for text in stage.described(events)]
         told = None if stop is None else stages[-1].ending(stop, outcome)
         if outcome == "interrupted":

@@ -14,9 +14,8 @@ from branches.graph.stored import DIAGRAM, read_any, save
 from branches.run.display import Display
 from branches.run.executor import WAIT, executor, run_jobs, trouble
 from branches.run.runner import compute_scene
-from branches.scene.fields import ConfigError
+from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import difference, dump, parse
-from branches.scene.scene import Scene
 from branches.scene.stages import stages_of
 from branches.scene.sweep import Sweep
 from branches.store.files import ANOTHER_DIAGRAM, StoreError, another_scene, only_run, prepare, write_bytes

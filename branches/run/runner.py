@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from branches.run.display import Display
-from branches.scene.fields import ConfigError
+from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import difference, parse
-from branches.scene.scene import Scene
 from branches.scene.stage import Stage
 from branches.scene.stages import stages_of
 from branches.store.files import StoreError, only_run, prepare
@@ -48,9 +47,10 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
             display.note(f"{path} is complete already ({done}); nothing to do")
             return "complete"
         prepare(path)
-        outcome, stop, writer = _followed(_begun(scene, path if resume else None), path, display, Interruption())
+        begun = _begun(scene, path if resume else None)
+        outcome, stop, writer = _followed(begun, path, display, Interruption())
         with contextlib.closing(writer):
-            display.summary(scene, writer.events(), writer.count, time.perf_counter() - began, path, outcome, stop)
+            display.summary(begun.stages, writer.events(), writer.count, time.perf_counter() - began, path, outcome, stop)
             for note in writer.notes:
                 display.note(note)
     return outcome

@@ -6,9 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from branches.scene.fields import Interval, MeshConfig, StepConfig, Strict, show
-from branches.scene.scene import Scene
-from branches.scene.text import plain
+from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, plain, show
 from branches.scene.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label

@@ -15,8 +15,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from branches.scene.fields import Interval, MeshConfig, StepConfig, Strict, show
-from branches.scene.scene import Scene
+from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
 from branches.scene.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
+import yaml
 from pydantic import BaseModel, ValidationError
 
 from branches.scene.closed import ClosedScene
-from branches.scene.fields import ConfigError, show
-from branches.scene.scene import Scene
-from branches.scene.sweep import Sweep, combinations, lists_in
-from branches.scene.text import plain, read, written
+from branches.scene.fields import ConfigError, Scene, plain, show
+
+if TYPE_CHECKING:
+    from branches.scene.sweep import Sweep
 
 #: Largest number of branches in one scene. With ten times more, a mistyped list would run for hours.
 _MOST_BRANCHES = 10_000
@@ -83,6 +85,8 @@ def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str,
     ValueError, ConfigError
         A field that is invalid in every combination, or a combination that is given twice.
     """
+    from branches.scene.sweep import Sweep, combinations  # most scenes are of one branch
+
     for place, entries in lists.items():
         if not entries or any(isinstance(entry, (list, dict)) for entry in entries):
             empty = "" if entries else ": the list is empty"
@@ -149,6 +153,24 @@ def _put(values: dict, path: list[str], value: Any) -> None:
     values[path[-1]] = value
 
 
+def lists_in(values: dict, places: Sequence[tuple[str, ...]]) -> dict[tuple, list]:
+    """Return the lists that stand in place of single values, by where they are in a scene; ``*`` and ``#`` match any key."""
+    found = (pair for pattern in places for pair in _at(values, pattern))
+    return {place: value for place, value in found if isinstance(value, list)}
+
+
+def _at(value: Any, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
+    """Yield the places below a value that match a pattern, and what is there."""
+    if not pattern:
+        yield place, value
+    elif pattern[0] == "#":
+        for number, one in enumerate(value if isinstance(value, list) else ()):
+            yield from _at(one, pattern[1:], (*place, number))
+    elif isinstance(value, dict):
+        for key in list(value) if pattern[0] == "*" else [pattern[0]] if pattern[0] in value else []:
+            yield from _at(value[key], pattern[1:], (*place, key))
+
+
 # --- messages -----------------------------------------------------------------------------------------------------
 
 
@@ -195,3 +217,94 @@ def _fields(location, model: type[BaseModel]) -> list[str]:
 
 def _is_model(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
+
+
+# --- the scenes of the package ----------------------------------------------------------------------------------------
+
+
+#: The folder of scenes: in an installed package, and in a working copy.
+_FOLDERS = Path(__file__).resolve().parents[1] / "configs", Path(__file__).resolve().parents[2] / "configs"
+
+
+def scenes() -> list[Path]:
+    """Return the files of all scenes of the package, by name."""
+    return sorted(file for folder in _FOLDERS for file in folder.glob("*.yaml"))
+
+
+def found(name: str) -> str:
+    """Return the file of a scene: the given one, or, where there is none, the scene of the package with this name.
+
+    Examples
+    --------
+    >>> Path(found("m1_n2")).name, found("no such scene")
+    ('m1_n2.yaml', 'no such scene')
+    """
+    return name if Path(name).exists() else next((str(file) for file in scenes() if file.stem == name), name)
+
+
+# --- YAML -------------------------------------------------------------------------------------------------------------
+
+
+#: Largest number of nested levels. Scenes have three; thousands would take seconds to read.
+_DEEPEST = 20
+
+
+class _Loader(yaml.SafeLoader):
+    """Loader for the subset of YAML in scenes: no aliases (which can expand without bound), no tags, no duplicate keys.
+
+    Plain words are read as in YAML 1.2: 1e-12 is a number, while 1:30, 010 and yes are text.
+    """
+
+    yaml_implicit_resolvers: dict = {}
+
+    def compose_node(self, parent, index):
+        self._depth = getattr(self, "_depth", 0) + 1
+        if self._depth > _DEEPEST:
+            raise RecursionError
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None):
+            raise yaml.MarkedYAMLError(problem="a scene has no aliases and no tags", problem_mark=event.start_mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_mapping(self, node, deep=False):
+        seen = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value in seen:
+                raise yaml.MarkedYAMLError(problem=f"the key {key.value!r} is given twice", problem_mark=key.start_mark)
+            seen.add(key.value if isinstance(key, yaml.ScalarNode) else None)
+        return super().construct_mapping(node, deep)
+
+
+for _kind, _pattern, _first in (
+    ("null", r"~|null|", ["~", "n", ""]),
+    ("bool", r"true|false", list("tf")),
+    ("int", r"[-+]?(0|[1-9][0-9]{0,30})", list("-+0123456789")),
+    ("float", r"[-+]?((\.[0-9]+|[0-9]+\.[0-9]*)([eE][-+]?[0-9]+)?|[0-9]+[eE][-+]?[0-9]+|\.inf)|\.nan", list("-+.0123456789")),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(f"^(?:{_pattern})$"), _first)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Dumper that quotes texts which ``_Loader`` would read as other types."""
+
+    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+
+
+def written(values: dict) -> str:
+    """Return the fields of a scene as YAML text."""
+    return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
+
+
+def read(text: str, name: str) -> Any:
+    """Return the value of a YAML text; messages call it ``name``."""
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" in line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise ConfigError(f"{name}: not usable YAML{where}: {problem}") from error
+    except RecursionError as error:
+        raise ConfigError(f"{name}: not usable YAML: nested too deeply") from error

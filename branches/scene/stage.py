@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from branches.scene.columns import Change, Columns
+from branches.scene.fields import Scene
 from contin import Point, Reason
 from contin.lowlevel import Collocation, Continuation, State, Stop
-
-if TYPE_CHECKING:
-    from branches.scene.columns import Change, Columns
-    from branches.scene.scene import Scene
 
 
 class Watch(ABC):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from branches.scene.scene import Scene
+from branches.scene.fields import Scene
 from branches.scene.stage import Stage
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from branches.scene.scene import Scene
+from branches.scene.fields import Scene
 
 
 @dataclass(frozen=True)
@@ -38,24 +38,6 @@ class Sweep:
     def fields(self) -> dict:
         """Return the fields of the scene as they are written."""
         return next(iter(self.scenes.values())).as_written(self.values)
-
-
-def lists_in(values: dict, places: Sequence[tuple[str, ...]]) -> dict[tuple, list]:
-    """Return the lists that stand in place of single values, by where they are in a scene; ``*`` and ``#`` match any key."""
-    found = (pair for pattern in places for pair in _at(values, pattern))
-    return {place: value for place, value in found if isinstance(value, list)}
-
-
-def _at(value: Any, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
-    """Yield the places below a value that match a pattern, and what is there."""
-    if not pattern:
-        yield place, value
-    elif pattern[0] == "#":
-        for number, one in enumerate(value if isinstance(value, list) else ()):
-            yield from _at(one, pattern[1:], (*place, number))
-    elif isinstance(value, dict):
-        for key in list(value) if pattern[0] == "*" else [pattern[0]] if pattern[0] in value else []:
-            yield from _at(value[key], pattern[1:], (*place, key))
 
 
 def combinations(values: dict, axes: list[tuple[tuple, list[tuple]]]) -> Iterator[tuple[dict[str, Any], dict]]:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from branches.scene.columns import Columns
+from branches.scene.fields import Scene
 from branches.scene.labels import SPECIAL, Label, label_of
 from branches.scene.parse import dump
-from branches.scene.scene import Scene
 from branches.scene.stages import stages_of
 from branches.store.files import StoreError
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import h5py
 
-from branches.scene.fields import ConfigError
+from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import parse
-from branches.scene.scene import Scene
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED, OPEN, check, damage_told
