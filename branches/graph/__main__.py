@@ -13,7 +13,7 @@ from pathlib import Path
 
 from branches.graph import closed as diagram
 from branches.graph.stored import OPEN_FORMAT, read_any
-from branches.store.command import Parser
+from branches.store.command import Parser, complain, write_output
 from branches.store.files import StoreError
 from contin.lowlevel import exact_text
 
@@ -29,16 +29,17 @@ def read(path: str | Path):
     if Path(path).suffix not in (".yaml", ".yml"):
         return read_any(path)
     from branches.graph.kinds import graph_kind
-    from branches.scene.fields import ConfigError  # scenes take 0.15 s: not for questions about results
+    from branches.graph.preview import preview  # scenes and quadratures take 0.3 s: not for questions about results
+    from branches.scene.fields import ConfigError
     from branches.scene.parse import load
 
     try:
         scene = load(path)
-        return graph_kind(scene).preview(scene)
     except ConfigError as error:
         raise StoreError(str(error)) from error
-    except StoreError as error:
-        raise StoreError(f"{str(path)!r}: {error}") from error
+    if not graph_kind(scene).EXACT:
+        raise StoreError(f"{str(path)!r} is a scene of an open strip, for which there is no exact solution; run it")
+    return preview(scene)
 
 
 def parser() -> Parser:
@@ -60,13 +61,10 @@ def main(argv=None) -> int:
     options = parser().parse_args(argv)
     try:
         lines = list(_answers(read(options.folder), options))
-    except StoreError as error:
-        print(f"error: {error}", file=sys.stderr)
+    except (StoreError, KeyError) as error:
+        complain(f"error: {error.args[0]}")
         return 2
-    except KeyError as error:
-        print(f"error: {error.args[0]}", file=sys.stderr)
-        return 2
-    print("\n".join(lines))
+    write_output("\n".join(lines) + "\n")
     return 0
 
 

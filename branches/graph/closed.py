@@ -13,12 +13,15 @@ from itertools import pairwise
 import numpy as np
 
 from branches.graph.interpolation import places
-from branches.graph.stored import COLUMNS
+from branches.graph.stored import CLOSED_FORMAT, COLUMNS
+from branches.scene.closed import ClosedScene
 from branches.scene.labels import SPECIAL, common_index, kind_of
 from contin.lowlevel import exact_text
 from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 
+#: The format of diagrams of closed strips, the title of one without, and whether there is an exact solution.
+FORMAT, TITLE, EXACT = CLOSED_FORMAT, "diagram", True
 #: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
 _MEETINGS = ("secondary bifurcation", "primary branch")
 #: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
@@ -48,7 +51,7 @@ class Course:
     pieces: list[dict]
 
 
-def course_of(branch, file: str) -> Course:
+def part(branch, file: str, numbers: object = None) -> Course:
     """Return the course of a primary branch from its file."""
     family, special = _family(branch.config), _special(branch)
     nodes = [_node_of(event, family, branch) for event in special]
@@ -72,7 +75,7 @@ def add_branch(graph, branch, name: str) -> bool:
         domain, and its images under the symmetries of the primary branch.)
     """
     if not branch.config["origin"]:
-        return add_course(graph, course_of(branch, name))
+        return add(graph, part(branch, name))
     family, special = _family(branch.config), _special(branch)
     nodes = _nodes_of_secondary(graph, special, family, branch)
     start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
@@ -81,7 +84,7 @@ def add_branch(graph, branch, name: str) -> bool:
     return connect(graph, family, nodes, _pieces_of(branch, special), file=name)
 
 
-def add_course(graph, course: Course) -> bool:
+def add(graph, course: Course) -> bool:
     """Add a primary branch to the diagram; see `add_branch`."""
     return connect(graph, course.family, course.nodes, course.pieces, file=course.file)
 
@@ -155,6 +158,11 @@ def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dic
     for (a, _), (b, _), columns in zip(nodes, nodes[1:], pieces):
         graph.add_edge(a, b, **family, **attributes, **columns)
     return True
+
+
+def holds(graph, scene: ClosedScene) -> bool:
+    """Return whether a diagram has the branch of a scene, from its other end."""
+    return holds_circle(graph, scene.material, scene.nu, scene.m, scene.n)
 
 
 def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
@@ -319,6 +327,21 @@ def folds(graph, low: float, high: float, law: str | None = None, nu: float | No
 
 
 # --- in words ------------------------------------------------------------------------------------------------------
+
+
+def lines(course: Course) -> list[str]:
+    """Return a branch and its special points in one line."""
+    return [f"{course.name}: {describe([attributes for _, attributes in course.nodes])}"]
+
+
+def counts(graph, title: str) -> tuple[str, str]:
+    """Return how many branches and special points a diagram has, in two lines."""
+    kinds = [kind for _, kind in graph.nodes(data="kind")]
+    return (
+        f"{title or TITLE}: {len(families(graph))} branches",
+        f"{kinds.count('circle')} bifurcations of circles, {kinds.count('fold')} folds, "
+        f"{kinds.count('leaves')} branches that end at the scene's own limits",
+    )
 
 
 def describe(nodes) -> str:

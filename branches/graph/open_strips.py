@@ -11,9 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from branches.graph.stored import OPEN_FORMAT, new_graph
 from branches.scene.labels import SPECIAL, label_of, without_round_off
 from branches.store.open_branch import OpenBranch
 from contin.lowlevel import exact_text
+
+#: The format of diagrams of open strips, the title of one without, and whether there is an exact solution.
+FORMAT, TITLE, EXACT = OPEN_FORMAT, "open strips", False
 
 
 @dataclass(frozen=True)
@@ -25,10 +29,10 @@ class Part:
     notes: tuple[str, ...]
 
 
-def part_of(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
+def part(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
     """Return the part of a diagram that a result is."""
     names: dict[int, str] = {}
-    part, about = Part({}, [], branch.notes), {"file": file, "numbers": numbers}
+    found, about = Part({}, [], branch.notes), {"file": file, "numbers": numbers}
     for event in branch.events:
         if event["label"].decode() not in SPECIAL:
             continue
@@ -41,7 +45,7 @@ def part_of(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
         names[row] = f"{file}: stage {stage}, {kind} {row}"
         columns = {name: float(event[name]) for name in branch.columns.shown()}
         changes = {name: int(event[name]) for name in ("index_before", "index_after")}
-        part.nodes[names[row]] = {
+        found.nodes[names[row]] = {
             "kind": kind, "stage": stage, "breaks": event["breaks"].decode(), **changes, **about,
             "arclength": float(event["arclength"]), **columns,
         }  # fmt: skip
@@ -51,14 +55,35 @@ def part_of(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
         ends = names[int(piece.rows[0])], names[int(piece.rows[-1])]
         followed = branch.followed(piece.stage)
         own = {"followed": followed, "factor": branch.scene.factor(followed), "index": branch.index_on(piece.rows)}
-        part.edges.append((*ends, {"stage": piece.stage, **own, "ends": list(ends), **about, **columns}))
-    return part
+        found.edges.append((*ends, {"stage": piece.stage, **own, "ends": list(ends), **about, **columns}))
+    return found
 
 
-def add_part(graph, part: Part) -> None:
+def add(graph, found: Part) -> None:
     """Add a result to the graph."""
-    graph.add_nodes_from(part.nodes.items())
-    graph.add_edges_from(part.edges)
+    graph.add_nodes_from(found.nodes.items())
+    graph.add_edges_from(found.edges)
+
+
+def holds(graph, scene) -> bool:
+    """Return that each combination is computed."""
+    return False
+
+
+def lines(found: Part) -> list[str]:
+    """Return a result in words: its stages with their special points, and its notes."""
+    graph = new_graph("", FORMAT)
+    add(graph, found)
+    return [*listed(graph), *found.notes]
+
+
+def counts(graph, title: str) -> tuple[str, str]:
+    """Return how many branches and special points a diagram has, in two lines."""
+    kinds, files = [kind for _, kind in graph.nodes(data="kind")], {file for *_, file in graph.edges(data="file")}
+    return (
+        f"{title or TITLE}: {len(files)} branches",
+        f"{kinds.count('fold')} folds, {kinds.count('branch point')} branch points",
+    )
 
 
 def listed(graph) -> Iterator[str]:

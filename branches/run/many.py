@@ -7,10 +7,11 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-from branches.graph.kinds import GraphKind, graph_kind
-from branches.graph.stored import DIAGRAM, read_any, save
+from branches.graph.kinds import graph_kind
+from branches.graph.stored import DIAGRAM, new_graph, read_any, save
 from branches.run.display import Display
 from branches.run.executor import WAIT, executor, run_jobs, trouble
 from branches.run.runner import compute_scene
@@ -107,7 +108,7 @@ def run_many(
     with only_run(folder / DIAGRAM):
         parts = {} if overwrite else _kept(sweep, folder, kind)
         failed, left_out = _compute_missing(sweep, folder, display, executor(scheduler, workers, time_limit), (kind, parts))
-        graph = kind.new(sweep.title)
+        graph = new_graph(sweep.title, kind.FORMAT)
         for file in sweep.scenes:
             if file in parts:
                 kind.add(graph, parts[file])
@@ -119,7 +120,7 @@ def run_many(
     return "lost" if failed else "complete"
 
 
-def _kept(sweep: Sweep, folder: Path, kind: GraphKind) -> dict[str, Any]:
+def _kept(sweep: Sweep, folder: Path, kind: ModuleType) -> dict[str, Any]:
     """Return the parts of the complete branches in the folder, by file.
 
     Raises
@@ -167,13 +168,13 @@ def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -
         their other ends.
     """
     kind, parts = found
-    graph = kind.new()
+    graph = new_graph("", kind.FORMAT)
     for part in parts.values():
         kind.add(graph, part)
     fresh, kept = [file for file in sweep.scenes if file not in parts], len(parts)
     plan, failed = _Plan(sweep, fresh, lambda scene: kind.holds(graph, scene)), {}
     _load_kernels([sweep.scenes[file] for file in fresh])
-    display.begin_many(sweep.title or kind.title, len(sweep.scenes), kept)
+    display.begin_many(sweep.title or kind.TITLE, len(sweep.scenes), kept)
     if fresh:
         with run as (submit, wait, limit):
             for done, ((file, *_), result) in enumerate(run_jobs(plan.next, compute, submit, limit, wait), 1):

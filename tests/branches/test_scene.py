@@ -10,7 +10,7 @@ import pytest
 
 from branches.explore.gather import gather
 from branches.graph.kinds import graph_kind
-from branches.graph.stored import save
+from branches.graph.stored import new_graph, save
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.closed_stage import ClosedStage
@@ -41,7 +41,7 @@ def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
     with h5py.File(tmp_path / "x.h5") as file:
         assert file["points"].attrs["twice"] == "twice the energy"
     kind = graph_kind(scene)
-    graph = kind.new()
+    graph = new_graph("", kind.FORMAT)
     kind.add(graph, kind.part(branch, "x.h5", {}))
     assert all(np.allclose(edge["twice"], 2 * np.array(edge["energy"])) for *_, edge in graph.edges(data=True))
     save(graph, tmp_path)
