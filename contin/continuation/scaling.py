@@ -40,6 +40,11 @@ from contin.events.significance import on_finer_mesh
 #: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
 #: times more separate eigenvalues that differ by a tenth.
 _ITERATIONS = 12
+#: The iterations end earlier where their numbers change by less than this. With ten times more, vectors keep more of other
+#: eigenvectors than `_LASTS`; with ten times less they take half of the time longer.
+_SETTLED = 1e-3
+#: Fewest numbers that are compared.
+_FEWEST = 4
 #: Largest Krylov space that parts close eigenvalues: those that differ by a tenth. Twice as many part some that differ by 1e-2.
 _KRYLOV = 12
 #: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
@@ -265,7 +270,9 @@ class _FirstPoint:
                 if not growth[-1] > 0:
                     break
                 v = image / np.linalg.norm(image)
-            else:
+                if _has_settled(growth):
+                    break
+            if growth[-1] > 0:
                 rate = float(np.exp(np.mean(np.log(growth[-4:]))))
                 nearer = found is None or rate ** (-1 / order) < found.distance
                 if rate > _NILPOTENT * max(growth[2:]) and nearer:
@@ -361,9 +368,11 @@ class _FirstPoint:
         """
         mine = self.system.largest(mode.vector) > 0
         left = term = self._kept(term, mine)
-        for _ in range(_ITERATIONS if term.any() else 0):
+        sizes = [float(np.linalg.norm(term))]
+        while sizes[-1] > 0 and len(sizes) <= _ITERATIONS and not _has_settled(sizes):
             left = self._kept(self._changed(left, self.tangent, mode.order) / mode.rate, mine)
-        size = float(np.linalg.norm(left))
+            sizes.append(float(np.linalg.norm(left)))
+        size = sizes[-1]
         return float(np.linalg.norm(mode.vector)) / size if size > _NOTHING * np.linalg.norm(term) else np.inf
 
     # --- errors --------------------------------------------------------------------------------------------------
@@ -405,6 +414,17 @@ class _FirstPoint:
         kept_states = np.tile(kept[:count], self.system.state_size // count)
         result: Array = v * np.concatenate([kept_states, kept[count:]])
         return result
+
+
+def _has_settled(numbers: Sequence[float]) -> bool:
+    """Return whether the last numbers of an iteration differ by less than a size needs: from one, and from two before.
+
+    Of two eigenvalues of opposite sign the numbers alternate.
+    """
+    if len(numbers) < _FEWEST:
+        return False
+    one, other = numbers[-1] * numbers[-2], numbers[-3] * numbers[-4]
+    return abs(one - other) < _SETTLED * one
 
 
 def _reach(terms: Sequence[Array]) -> float:
