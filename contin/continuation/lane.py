@@ -60,7 +60,7 @@ from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.crossings import changes_little
-from contin.events.inspection import Start, free_of, is_elsewhere
+from contin.events.inspection import Start, free_of, returned
 from contin.events.spectra import spectra_of
 from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factored, Factorization
@@ -199,7 +199,7 @@ class Lane(ABC):
     def _asks(self, before: Trial, trial: Trial, step: float, closes: float) -> bool:
         """Return whether a step asks for a closer look by what the kernel does not know, be it that this is not found."""
         try:
-            return bool(closes and not is_elsewhere(self._start, before, trial, step)) or self._passes(before, trial)
+            return bool(closes and returned(self._start, before, trial, step)) or self._passes(before, trial)
         except ConvergenceError:
             return True
 

@@ -11,7 +11,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -328,36 +328,23 @@ class Inspection:
 
     def may_close(self) -> bool:
         """Return whether the first point of the run may lie in this step."""
+        return self.arc.state.accepted >= FEWEST and self._returned is not None
+
+    @functools.cached_property
+    def _returned(self) -> Returned | None:
         arc = self.arc
-        if arc.state.accepted < FEWEST:
-            return False
-        return not is_elsewhere(self.start, arc.beginning(), arc.trial, arc.step)
+        return returned(self.start, arc.beginning(), arc.trial, arc.step)
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
-        arc = self.arc
-        state, trial, step = arc.state, arc.trial, arc.step
-        home, x, tangent = self.start
-        if not self.may_close():
+        arc, found = self.arc, self._returned
+        if arc.state.accepted < FEWEST or found is None:
             return None
-        if home is not state.system:
-            carry = home.carrier(state.system)
-            x, tangent = carry(x), carry(tangent)
-            if home.scales is not state.system.scales:
-                tangent = tangent / np.sqrt(inner(state.system, tangent, tangent))
-        size = state.system.state_size
-        if np.max(np.abs(x[size:] - trial.x[size:])) > REACH * step:
-            return None
-        x = state.system.lifted(x, trial.x)
-        first, (leaving,) = state.system.in_phase(x, (tangent,), trial.x)
-        passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
-        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:
-            return None
-        at = step * passed[0] / (passed[0] - passed[1])
+        system, trial, (at, x, tangent, first) = arc.state.system, arc.trial, found
         off = arc.guess(at) - first
-        if np.sqrt(inner(state.system, off, off)) > _BACK * step:
+        if np.sqrt(inner(system, off, off)) > _BACK * arc.step:
             return None
-        there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
+        there = Trial(system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
         return SpecialPoint(at, Label.END, "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))
 
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
@@ -390,19 +377,46 @@ class Inspection:
         return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)
 
 
-def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool:
-    """Return whether the first point of a run is certainly not in a step: it is too far from both ends together.
+class Returned(NamedTuple):
+    """A place in a step that the first point of a run is behind: x and tangent there, and x in phase with the step's end."""
+
+    at: float
+    x: Array
+    tangent: Array
+    first: Array
+
+
+def returned(start: Start, before: Trial, trial: Trial, step: float) -> Returned | None:
+    """Return where a step passes the first point of a run, which it may leave aside; None where it certainly does not."""
+    if _is_elsewhere(start, before, trial, step):
+        return None
+    system, (home, x, tangent) = trial.system, start
+    if home is not system:
+        carry = home.carrier(system)
+        x, tangent = carry(x), carry(tangent)
+        if home.scales is not system.scales:
+            tangent = tangent / np.sqrt(inner(system, tangent, tangent))
+    x = system.lifted(x, trial.x)
+    first, (leaving,) = system.in_phase(x, (tangent,), trial.x)
+    a, b = (inner(system, end.x - first, leaving) for end in (before, trial))
+    if not a < 0 <= b or inner(system, trial.tangent, leaving) < _SAME_WAY:
+        return None
+    return Returned(step * a / (a - b), x, tangent, first)
+
+
+def _is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool:
+    """Return whether the first point of a run is certainly not in a step: a parameter or the distance is too far from it.
 
     Without this each step would carry the first point to its mesh and bring it in phase.
     """
     system, (home, x, _) = trial.system, start
     first, size = free_of(home, x, system).tolist(), system.state_size
     ends = [end.x[size:].tolist() for end in (before, trial)]
-    if sum(math.dist(first, end) for end in ends) > REACH * step:
-        return True  # the free parameters are
     rates = [end.tangent[size:].tolist() for end in (before, trial)]
     if any(misses(value, a, t, b, u, step) for value, a, t, b, u in zip(first, ends[0], rates[0], ends[1], rates[1])):
         return True
+    if sum(math.dist(first, end) for end in ends) > REACH * step:
+        return True  # the free parameters are
     if home.scales is not system.scales:
         return False
     kept = home.lasting(x)
