@@ -242,11 +242,12 @@ class MeshLane(Lane):
         settings, newton, n = self.settings, self.settings.newton, system.states_count
         autonomous = system.size_of_solutions is not None
         self._work, self._factors = system.workspace, [system.unfilled_factors(), system.unfilled_factors()]
-        self._rooms = MeshRooms(
+        rooms = MeshRooms(
             self._work, self._factors[0].room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
             np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
             self._frame, self._attempt, self._control, self._watch,
         )  # fmt: skip
+        self._rooms = [rooms, rooms._replace(factored=self._factors[1].room)]
         self._still = max((test.still for test in given[2]), default=0.0)
         may_grow = settings.mesh.every and system.intervals < settings.mesh.max_intervals
         self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
@@ -285,7 +286,7 @@ class MeshLane(Lane):
         for number in range(2, len(path.x)):
             now, after = 1 - now, self._factors[1 - now]
             bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
-            step = step_on_mesh(self._rooms._replace(factored=after.room), path, accepted, number, bend)
+            step = step_on_mesh(self._rooms[now], path, accepted, number, bend)
             asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
             if not asks:
                 was, found = clear, MAY_BRANCH
@@ -306,7 +307,7 @@ class MeshLane(Lane):
 
     def _begun(self, path: Path, here: Trial) -> Factorization | None:
         """Prepare steps from row 1 of a path, the point ``here``; return the factors there, None where they are not found."""
-        _, factored, newton, report, amplitude, frame, *_ = self._rooms
+        _, factored, newton, report, amplitude, frame, *_ = self._rooms[0]
         values = self._work.values
         conditions, targets = self.system.linear_conditions
         values.rows[: len(targets)], values.targets[: len(targets)] = conditions, targets
@@ -337,7 +338,7 @@ class MeshLane(Lane):
         """Keep a step that was made and asks for a closer look, with its factors, which stand at a place."""
         sign, iterations, error = self._attempt.judged[[SIGN, UPDATES, ERROR]].tolist()
         factors, self._factors[place] = self._factors[place], self.system.unfilled_factors()
-        self._rooms = self._rooms._replace(factored=self._factors[0].room)
+        self._rooms[place] = self._rooms[place]._replace(factored=self._factors[place].room)
         factors.sign = sign
         linear = Linearization(path.tangents[number].copy(), sign, factors)
         self._handed = step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)

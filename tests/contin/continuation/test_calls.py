@@ -63,5 +63,5 @@ def calls(point, name, step, count):
 @pytest.mark.parametrize("kind", [equilibria, henon, bratu, cycles])
 def test_a_plain_step_calls_few_python_functions(kind):
     given = kind()
-    calls(*given, 20)  # functions are recorded, kernels loaded
+    calls(*given, 60)  # functions are recorded, kernels loaded
     assert (calls(*given, 60) - calls(*given, 20)) / 40 <= MOST
