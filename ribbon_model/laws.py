@@ -73,19 +73,9 @@ def rod_hamiltonian(M1, M2, M3, kappa_n, B1, B2, C):
     return M1 * M1 / (2 * B1) + M1 * kappa_n + M2 * M2 / (2 * B2) + M3 * M3 / (2 * C) + kappa_n * kappa_n / 2
 
 
-def rod_energy(w1, w2, w3, kappa_n, B1, B2, C):
-    """General rod: the Legendre transform of `rod_hamiltonian`."""
-    return rigid_rod_energy(w1, w2, w3, kappa_n, B1, C) + B2 * w2 * w2 / 2
-
-
 def rigid_rod_hamiltonian(M1, M2, M3, kappa_n, B1, C):
     """General rod that does not bend in its plane."""
     return M1 * M1 / (2 * B1) + M1 * kappa_n + M3 * M3 / (2 * C) + kappa_n * kappa_n / 2
-
-
-def rigid_rod_energy(w1, w2, w3, kappa_n, B1, C):
-    """General rod that does not bend in its plane: the Legendre transform of `rigid_rod_hamiltonian`."""
-    return B1 * (w1 - kappa_n) * (w1 - kappa_n) / 2 + C * w3 * w3 / 2 - kappa_n * kappa_n / 2
 
 
 class Ribbon(Law):
@@ -216,7 +206,7 @@ RIBBON = Ribbon(
 )  # fmt: skip
 FLAT_ROD = FlatRod(
     "flat rod", flat_rod_hamiltonian, energy=flat_rod_energy, additive=True, plate=True,
-    forms=(PlateLaw("flat rod", plate.flat_rod, True, _PLATE, plate.flat_rod_energy, additive=True, plate=True),),
+    forms=(PlateLaw("flat rod", plate.flat_rod, True, _PLATE, additive=True, plate=True),),
 )  # fmt: skip
 ISOTROPIC_ROD = IsotropicRod("isotropic rod", isotropic_rod_hamiltonian, False, energy=isotropic_rod_energy, additive=True)
 FINITE_WIDTH = Law(
@@ -227,8 +217,8 @@ FINITE_WIDTH = Law(
 )  # fmt: skip
 #: The general Kirchhoff rod; an infinite B2 is a strip that does not bend in its plane.
 ROD = Law(
-    "rod", rod_hamiltonian, False, dict.fromkeys(("B1", "B2", "C"), _STIFFNESS), rod_energy, additive=True,
-    forms=(Law("rod", rigid_rod_hamiltonian, True, dict.fromkeys(("B1", "C"), _STIFFNESS), rigid_rod_energy, additive=True),),
+    "rod", rod_hamiltonian, False, dict.fromkeys(("B1", "B2", "C"), _STIFFNESS), additive=True,
+    forms=(Law("rod", rigid_rod_hamiltonian, True, dict.fromkeys(("B1", "C"), _STIFFNESS), additive=True),),
 )  # fmt: skip
 
 #: The laws of the paper by name, each a closed expression for H in which nu is the one parameter.

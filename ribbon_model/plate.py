@@ -39,12 +39,6 @@ def flat_rod(M1, M2, M3, kappa_n, D11, D12, D22, D66):
     return M1 * M1 / (2 * (D11 - D12 * D12 / D22)) + M1 * kappa_n + M3 * M3 / (8 * D66) + kappa_n * kappa_n / 2
 
 
-def flat_rod_energy(w1, w2, w3, kappa_n, D11, D12, D22, D66):
-    """Return U of a flat rod."""
-    bent = w1 - kappa_n
-    return (D11 - D12 * D12 / D22) * bent * bent / 2 + 2 * D66 * w3 * w3 - kappa_n * kappa_n / 2
-
-
 def ribbon(M1, M2, M3, kappa_n, D11, D12, D22, D66):
     """Return H of a ribbon."""
     plate = plate_of(D11, D12, D22, D66)
