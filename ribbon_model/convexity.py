@@ -6,51 +6,41 @@ square root, or through a jump: two neighbouring places of the strip take differ
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 
 import numpy as np
 
 from contin import Event
-from contin.lowlevel import Batch
-from ribbon_model.domains import StripProblem
-from ribbon_model.equilibrium import moment_with_force, moment_without_force
+from contin.lowlevel import Collocation
 from ribbon_model.law import Law
+from ribbon_model.solution import Solution
 
 #: Parts of a line between strains at neighbouring nodes. U is concave on a tenth of a jump at least (measured on (3, 1)).
 _PARTS = 16
 NAME = "the end of the convex strain energy"
 
 
-def margin(law: Law) -> Callable | None:
-    """``margin(system, x)``: the least det D2U / (U_11 U_33) along the strip, 1 on planar circles, -1 without a response.
+def least_on_lines(margin: Callable[[np.ndarray, np.ndarray], np.ndarray], t: np.ndarray, strains: np.ndarray) -> float:
+    """Return the least ``margin(t, strains)`` at nodes (K,) and on straight lines between the strains of neighbouring ones.
 
-    It is computed for the strains at the nodes and on straight lines between neighbouring nodes, which detects jumps. None
-    for a law whose H is a closed expression, because its domain is known.
+    At a jump, U is concave on the line. Without a response the margin is -1.
     """
-    return _least if law.ends_with_convexity else None
+    both = np.column_stack([t, strains])
+    lines = np.concatenate([both[:-1] + part * np.diff(both, axis=0) for part in np.arange(_PARTS) / _PARTS] + [both[-1:]])
+    return float(margin(lines[:, 0], lines[:, 1:]).min()) if np.all(np.isfinite(lines)) else -1.0
 
 
-def _least(system, x):
-    problem, p, u = system.problem, system.all_parameters(x), system.states(x)
-    names = tuple(problem.parameters)
-    w = _strains(problem).values(system.nodes, np.ascontiguousarray(u), u[:0], p)
-    w = np.concatenate([w[:-1] + part * np.diff(w, axis=0) for part in np.arange(_PARTS) / _PARTS] + [w[-1:]])
-    known = dict(zip(names, p))
-    values = [known[name] for name in ("kappa_n", *problem.law.parameters)]
-    return float(problem.law.margin(np.empty((len(w), 0)), w, *values).min())
+def margin(law: Law) -> Callable[[Collocation, np.ndarray], float] | None:
+    """Return ``margin(system, x)``, the least `Law.margin` along a closed strip: 1 on planar circles, -1 without a response.
 
+    None for a law whose H is a closed expression, because its domain is known.
+    """
 
-@functools.cache
-def _strains(problem: StripProblem) -> Batch:
-    """Return the strains from the states of a problem."""
-    moment = moment_with_force if "x1" in problem.state_names else moment_without_force
+    def least(system: Collocation, x: np.ndarray) -> float:
+        solution = Solution.at(system, x)
+        return least_on_lines(lambda _, w: law.margin(w, w, *solution.material), solution.t, solution.strains())
 
-    def strains(u, p, M, response):
-        H, w1, w2, w3, conjugate = response
-        return w1, w2, w3
-
-    return Batch([problem.law.at_points(moment, strains)], [3], problem.state_names, tuple(problem.parameters))
+    return least if law.ends_with_convexity else None
 
 
 def test_functions(law: Law) -> list[Event]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contin import Event
 from contin.lowlevel import Collocation, Continuation, Trial
+from ribbon_model.convexity import least_on_lines
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.section import Section
 
@@ -95,13 +96,9 @@ def _least_margin(section: Section, strains: Strains, trial: Trial) -> float:
 
 
 def _convexity(section: Section, strains: Strains, trial: Trial) -> float:
-    """Return the least `Section.margin` at the strains of the nodes and halfway between: at a jump, U is concave there."""
-    omega, t = strains(trial.system, trial.x), trial.system.nodes
-    if not np.all(np.isfinite(omega)):
-        return -1.0
-    places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
-    t = np.concatenate([t, (t[1:] + t[:-1]) / 2])
-    return float(section.margin(t, np.empty((len(t), 0)), places, _numbers(trial)).min())
+    """Return the least `Section.margin` at the strains of the nodes and on lines between these."""
+    p, omega = _numbers(trial), strains(trial.system, trial.x)
+    return least_on_lines(lambda t, w: section.margin(t, w, w, p), trial.system.nodes, omega)
 
 
 def _numbers(trial: Trial) -> SimpleNamespace:

@@ -93,8 +93,8 @@ def _zeros(function: Callable[[Circle], float], law: Law, m: int, values: tuple,
 def _root(function: Callable, a: float, b: float) -> float:
     """Return a zero between two places where a function of arrays has different signs, to round-off, on its positive side.
 
-    Each round divides their distance by 16. SciPy's ``brentq`` finds the same within two units in the last place, but takes .2 s
-    to load, as long as the check of a scene.
+    Each round divides their distance by 16. SciPy's ``brentq`` finds the same within two units in the last place, but takes
+    .2 s to load, as long as the check of a scene.
     """
     import numpy as np
 

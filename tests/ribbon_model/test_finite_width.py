@@ -323,7 +323,7 @@ def test_the_fold_of_1_2_is_born_at_the_pitchfork():
     folds = contin.curve(fold, "Gamma", direction=-1, limits={"Gamma": (4, 20), "M2": (-1e-3, 50)})
     (birth,) = folds.labelled("BP")
     assert 4 < birth["Gamma"] < 5
-    assert birth["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 1, 2, NU, birth["Gamma"])[0], abs=1e-9)
+    assert birth["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 1, 2, wide(birth["Gamma"]))[0], abs=1e-9)
     for Gamma, there in ((birth["Gamma"] - 0.05, 0), (birth["Gamma"] + 0.05, 1)):  # independently
         points = exact_finite_width.curve(1, 2, wide(Gamma))
         assert sum(point.label == "LP" for point in points) == there

@@ -114,7 +114,7 @@ def test_both_sides_of_the_saddle_between_two_arches():
     strip = OpenStrip(section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8}), numbers={"distance": 0.9})
     arches = [strip.first_point(strip.arch(side=side)) for side in (1.0, -1.0)]
 
-    column = OpenStrip(strip.material, finish=End(held=CLAMP.held[:2]), numbers={"force_tangent": -70.0})
+    column = OpenStrip(strip.section, finish=End(held=CLAMP.held[:2]), numbers={"force_tangent": -70.0})
     straight = contin.trace(column.first_point(), free=["force_tangent"], limits={"force_tangent": (-90, -60)}, direction=-1)
     (start, *_) = straight.labelled("BP")
     mode = contin.trace(start, branch=1, zeros={"distance": [0.9]}, limits={"distance": (0.85, 1.1)})
