@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import warnings
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -112,6 +113,12 @@ class OpenStrip(Shown):
         for name in self.phases:
             if name not in PHASES:
                 raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}")
+
+    @property
+    def material(self) -> Section:
+        """The section, by its name of version 0.2, which works for one version."""
+        warnings.warn("OpenStrip.material is OpenStrip.section now", DeprecationWarning, stacklevel=2)
+        return self.section
 
     # --- names --------------------------------------------------------------------------------------------------------
 

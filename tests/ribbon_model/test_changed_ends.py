@@ -17,7 +17,7 @@ ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
 
 
 def released(before, finish):
-    return OpenStrip(before.material, before.start, finish, dict.fromkeys(replacing_loads(finish), 0.0))
+    return OpenStrip(before.section, before.start, finish, dict.fromkeys(replacing_loads(finish), 0.0))
 
 
 def continued(strip, point, follow):

@@ -189,6 +189,33 @@ def test_thresholds_from_the_flat_rod_to_the_ribbon():
     assert [round(thresholds(FINITE_WIDTH, 1, 2, wide(G))[0], 3) for G in (1e-3, 10, 100)] == [5.615, 3.346, 2.680]
 
 
+def test_circles_have_the_closed_form_of_the_plate():
+    """M = (1 - nu**2 G) y - nu**2 G' y**2/4 and t = 2 (1 - nu) + 2 nu (1 - G) y, with y = 1 - kappa_n r0."""
+    for m, kappa_n, nu, Gamma in ((1, 2.0, 0.3, 10.0), (3, -1.0, -0.4, 0.7), (5, 9.0, 0.45, 200.0)):
+        x, y = (3 * (1 - nu**2)) ** 0.25 * math.sqrt(m * Gamma), 1 - kappa_n / m
+
+        def G(x):
+            return 2 * (mpmath.cosh(x) - mpmath.cos(x)) / (x * (mpmath.sinh(x) + mpmath.sin(x)))
+
+        value, slope = float(G(x)), float(x * mpmath.diff(G, x))
+        found = FINITE_WIDTH.on_circle(m, kappa_n, nu, Gamma)
+        assert found.moment / m == pytest.approx((1 - nu**2 * value) * y - nu**2 * slope * y**2 / 4, rel=1e-12)
+        assert found.twisting == pytest.approx(2 * (1 - nu) + 2 * nu * (1 - value) * y, rel=1e-12)
+
+
+def test_a_mode_has_a_second_threshold_far_from_the_natural_state():
+    """M = t (1 - k**2) is quadratic in kappa_n: the index of the circle changes at the second root, too."""
+    numbers = {"nu": -0.89, "Gamma": 1.1}
+    near, far = thresholds(FINITE_WIDTH, 3, 2, numbers)
+    assert near < 3 < far and stability_interval(FINITE_WIDTH, 3, numbers)[1] == far / 3
+    for side, expected in ((-1e-4, 0), (1e-4, 2)):
+        assert index(FINITE_WIDTH, 3, far + side, numbers) == expected
+    for kappa_n in (near, far):
+        found = FINITE_WIDTH.on_circle(3, kappa_n, *numbers.values())
+        assert found.moment / 3 == pytest.approx(found.twisting * (1 - (2 / 3) ** 2), rel=1e-12)
+        assert found.twisting > 0 and found.bending > 0
+
+
 @pytest.mark.full
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})

@@ -38,7 +38,7 @@ def drawn(seed: int) -> OpenStrip:
     numbers = {name: float(random.uniform(0, 0.4)) for name in strip.known if name in LOADS and random.random() < 0.4}
     if finish.rotation not in ("hinged", "joint"):
         numbers.pop("moment", None)
-    return OpenStrip(strip.material, start, finish, numbers)
+    return OpenStrip(strip.section, start, finish, numbers)
 
 
 def out_of_balance(strip: OpenStrip, point) -> float:
