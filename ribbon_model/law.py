@@ -26,6 +26,15 @@ from ribbon_model.older import takes_parameters
 _COUPLED = 1e-9
 
 
+#: Names that strips have already; a law's parameter of such a name would take their place, or they its.
+RESERVED = frozenset((
+    "kappa_n", "kappa_2", "tau_n", "softness", "kappa_star", "energy", "length", "turn", "sense", "axes", "unfold", "M1", "M2",
+    "M3", "R1", "R2", "R3", "q0", "q1", "q2", "q3", "x1", "x2", "x3", "support", "roller", "shear", "rise", "distance", "bend",
+    "swing", "force_width", "force_normal", "force_tangent", "moment", "weight", "foundation", "stroke", "width", "thickness",
+    "s", "pi",
+))  # fmt: skip
+
+
 class NoThreshold(ValueError):
     """A mode without a bifurcation on a circle on which the law is regular."""
 
@@ -113,15 +122,20 @@ class Law:
     forms : tuple of Law
         Statements of the same law by other parameters.
 
+    Raises
+    ------
+    ValueError
+        Parameters that are not `Parameter`, or have a name of `RESERVED`; a function with another number of arguments.
+
     Examples
     --------
     A law with a quartic energy of bending and a length of its own:
 
-    >>> def energy(w1, w2, w3, kappa_n, length):
+    >>> def energy(w1, w2, w3, kappa_n, core):
     ...     bent = w1 - kappa_n
-    ...     return bent**2 / 2 + length**2 * bent**4 / 4 + w3**2 / 2 - kappa_n**2 / 2
-    >>> law = Law.of_energy("stiffening", energy, {"length": Parameter(1)})
-    >>> law.circle(1, 0.5, {"length": 2.0})["M1"]
+    ...     return bent**2 / 2 + core**2 * bent**4 / 4 + w3**2 / 2 - kappa_n**2 / 2
+    >>> law = Law.of_energy("stiffening", energy, {"core": Parameter(1)})
+    >>> law.circle(1, 0.5, {"core": 2.0})["M1"]
     1.0
     """
 
@@ -138,6 +152,19 @@ class Law:
 
     #: True if the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).
     has_rulings: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        known = self.parameters if isinstance(self.parameters, Mapping) else {}
+        if len(known) != len(self.parameters) or not all(isinstance(each, Parameter) for each in known.values()):
+            raise ValueError(f"parameters: {self.parameters!r} must be a mapping of names to Parameter(...)")
+        for name in known:
+            if name in RESERVED or not name.isidentifier():
+                raise ValueError(f"parameters: {name!r} is a name of every strip, or not usable as a name; take another one")
+        for what in ("energy", "hamiltonian"):
+            function = getattr(self, what)
+            if function is not None and len(inspect.signature(function).parameters) != 4 + len(known):
+                named = ", ".join(["three moments" if what == "hamiltonian" else "three strains", "kappa_n", *known])
+                raise ValueError(f"{what}: must take {4 + len(known)} arguments: {named}")
 
     @classmethod
     def of_energy(

@@ -5,7 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from ribbon_model.domains import DOMAINS
+from ribbon_model.ends import ANGLES, PLACE
+from ribbon_model.equilibrium import CENTRELINE, FRAME, LOADS
+from ribbon_model.law import RESERVED, Law, Parameter
 from ribbon_model.laws import PAPER_LAWS, RIBBON
+from ribbon_model.loads import LOADS as DEAD
+from ribbon_model.loads import STROKE
+from ribbon_model.section import DIMENSIONS, NATURAL, SOFTNESS
 
 NU = 0.3
 
@@ -59,3 +66,37 @@ def test_moduli_on_a_circle(law):
     assert w3 / h == pytest.approx(1 / t, rel=1e-9)
     assert (w1, star) == pytest.approx((m, m), rel=1e-9)
     assert math.isclose(law.response(m - kappa, h, 0.0, kappa, NU)[2], 0.0 if law.constrained else h, abs_tol=1e-15)
+
+
+def test_statements_that_are_refused():
+    def energy(w1, w2, w3, kappa_n, core):
+        return w1 * w1 / 2 - kappa_n * w1 + w3 * w3 + core * w1**4
+
+    for parameters, sentence in (
+        (("core",), r"parameters: \('core',\) must be a mapping of names to Parameter"),
+        ({"core": 1}, "parameters: {'core': 1} must be a mapping"),
+        ({"length": Parameter(1)}, "parameters: 'length' is a name of every strip"),
+        ({"core": Parameter(1), "more": Parameter()}, "energy: must take 6 arguments: three strains, kappa_n, core, more"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            Law.of_energy("own", energy, parameters)
+
+
+def test_reserved_names_are_those_of_strips():
+    names = {
+        *LOADS,
+        *FRAME,
+        *CENTRELINE,
+        *PLACE,
+        *ANGLES,
+        *DEAD,
+        STROKE,
+        *NATURAL,
+        *DIMENSIONS,
+        SOFTNESS,
+        "kappa_star",
+        "energy",
+    }
+    for domain in DOMAINS.values():
+        names |= {*domain.parameters, *domain.free}
+    assert names <= RESERVED
