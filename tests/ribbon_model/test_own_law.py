@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 import pytest
-from branches.display import Display
-from branches.open_job import run_stages
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import jv
 
 import contin
-from branches import config as scenes
-from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.parse import parse
+from branches.store.read import read_branch
 from contin.lowlevel import point_of
 from ribbon_model import exact, laws, stability
 from ribbon_model.descent import descend, identify, perturbed
@@ -263,9 +263,9 @@ def test_a_sweep_of_open_scenes(monkeypatch, tmp_path):
         "finish: {rotation: hinged, about: width, place: free}\n"
         "stages: [{follow: moment, to: 4}]\n"
     )
-    sweep = scenes.parse(text, "scene")
-    for name, config in sweep.branches.items():
-        assert run_stages(config, tmp_path / name, Display(silent=True)) == "complete"
+    sweep = parse(text, "scene")
+    for name, config in sweep.scenes.items():
+        assert run_scene(config, tmp_path / name, Display(silent=True)) == "complete"
         found = read_branch(tmp_path / name)
         energy, y = found.points["energy"][-1], bending(4.0, config.material["core"])
         assert energy == pytest.approx(y**2 / 2 + config.material["core"] ** 2 * y**4 / 4, rel=1e-9)
