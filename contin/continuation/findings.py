@@ -36,7 +36,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
     if coarse is not None:
         better = coarse if found.trial is first else found.trial.system.coefficient(found)
-        found = with_normal_form(found, better or coarse, coarse)
+        found = with_normal_form(found, better or coarse, coarse, settings.errors)
     return found
 
 

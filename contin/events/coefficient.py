@@ -72,8 +72,12 @@ class Coefficient:
     @property
     def signed(self) -> float:
         """The value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations."""
-        certain = abs(self.value) > _CLEAR * self.size and self.size < _MODERATE
-        return self.value if certain or not abs(self.value) <= self.error else 0.0
+        return self.value if self.is_certain or not abs(self.value) <= self.error else 0.0
+
+    @property
+    def is_certain(self) -> bool:
+        """Its terms do not cancel, and are so small that it cannot be an error."""
+        return abs(self.value) > _CLEAR * self.size and self.size < _MODERATE
 
     @property
     def vanishes(self) -> bool:

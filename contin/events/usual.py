@@ -70,15 +70,17 @@ def fold(name: str) -> Event:
                  normal_form=normal_forms.fold)  # fmt: skip
 
 
-def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:
+def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient, errors: bool) -> SpecialPoint:
     """Return a special point with the coefficient in its details and, but for folds, what it means in its name.
 
     The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run. A coefficient that
-    is nothing but error is left out, and its error is stated.
+    is nothing but error is left out, and its error is stated. Where ``errors`` are not wanted, and none could change the sign,
+    it is not estimated.
     """
-    error = found.error + abs(found.value - coarse.value)
+    unknown = not errors and found.is_certain
+    error = 0.0 if unknown else found.error + abs(found.value - coarse.value)
     value = {} if found.is_meaningless(error) else {"normal_form": found.value}
-    details = {**(point.details or {}), **value, "normal_form_error": error}
+    details = {**(point.details or {}), **value, **({} if unknown else {"normal_form_error": error})}
     attracts, repels = found.side * found.value < -error, found.side * found.value > error
     is_fold = point.test is not None and point.test.normal_form is normal_forms.fold
     kind = "" if is_fold else ", supercritical" if attracts else ", subcritical" if repels else ""

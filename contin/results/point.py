@@ -128,7 +128,7 @@ class Point(Record):
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
         period doubling c and at a torus bifurcation Re d of `contin.events.normal_forms`; at a fold of cycles |b|, zero
         at a cusp. The c of period doublings of maps is positive where they are supercritical. Its estimated error is
-        ``details["normal_form_error"]``.
+        ``details["normal_form_error"]``; where errors are not wanted it is there only if it could change the sign.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
 
