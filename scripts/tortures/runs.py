@@ -127,8 +127,8 @@ def _report(progress) -> None:
 
     append, checkpoint = BranchWriter.append, BranchWriter.checkpoint
 
-    def told_append(self, point):
-        append(self, point)
+    def told_append(self, point, stage):
+        append(self, point, stage)
         progress[2] = time.monotonic()
 
     def told_checkpoint(self, *arguments):
