@@ -17,7 +17,7 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 
 #: Names of the arguments of a function that are named tuples; None for one that is a number, a list for a tuple of them.
-Arguments = Sequence[Any]
+Arguments = Sequence[tuple[str, ...] | list[Any] | None]
 #: Makes an array of a list of numbers.
 Maker = Callable[[Any], Any]
 
