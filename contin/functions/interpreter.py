@@ -404,9 +404,8 @@ def _begin(work, lists, row, lanes):
     """Put the unknowns of all lanes where their search starts.
 
     ``lists`` has from ``row`` on: k, 0 for a root, 1 for a minimum, 2 for one that may be a saddle, the first instruction of
-    the program for value, gradient
-    and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step that is
-    tried: -1 at the start, 0 where the search has arrived), and the registers of the starts.
+    the program for value, gradient and matrix, its end, the register described in `_direction` (behind the step: value before,
+    slope, part of the step that is tried: -1 at the start, 0 where the search has arrived), and the registers of the starts.
     """
     k, at = lists[row], lists[row + 4]
     size = k * (k + 1) // 2 if lists[row + 1] else k * k

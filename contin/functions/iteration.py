@@ -1,10 +1,9 @@
 """Unknowns that are found by iteration at each point, as operations of a tape.
 
-`minimum` and `root` are called inside a user's function. They record the potential or the residual with unknowns of its own
-on the
-same tape; the interpreter finds the unknowns by Newton's method in all points of a block (`contin.functions.interpreter`).
-Derivatives follow from the theorem on implicit functions, with operations on the tape: with A w = b the linearized equations
-at the solution, dw/dz = -A^-1 dG/dz. They are exact, and can be differentiated again.
+`minimum`, `root` and `least` are called inside a user's function. They record the potential or the residual with unknowns of
+their own on the same tape; the interpreter finds the unknowns by Newton's method in all points of a block
+(`contin.functions.interpreter`). Derivatives follow from the theorem on implicit functions, with operations on the tape: with
+A w = b the linearized equations at the solution, dw/dz = -A^-1 dG/dz. They are exact, and can be differentiated again.
 """
 
 from __future__ import annotations
