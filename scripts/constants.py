@@ -4,7 +4,7 @@
     python scripts/constants.py _FAR _CHORDS    # these only
 
 A line says how many of the bank's runs then miss a special point, find one too many or misplace one by more than 1e-9, and how
-the numbers of points and of factorizations change.
+the number of matrices changes that are factored outside kernels: where steps are looked at, and points located.
 """
 
 from __future__ import annotations
@@ -20,22 +20,23 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Rooms whose constants decide what a run does; those of functions and linalg are sizes of tables and of vectors.
-ROOMS = ("discretization", "stepping", "detection", "continuation", "analysis")
+#: Rooms whose constants do not decide what a run does: they are sizes of tables and of vectors.
+OTHERS = ("functions", "linalg", "problems", "results")
 #: Runs of the bank that take longer than the others together.
 SLOW = ("kar", "bru", "spb")
 
 
 def constants() -> Iterator[tuple[str, str]]:
     """Yield (module, name) of every private constant that is a number."""
-    for room in ROOMS:
-        for path in sorted((ROOT / "contin" / room).glob("*.py")):
-            for node in ast.parse(path.read_text()).body:
-                if isinstance(node, ast.Assign):
-                    names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
-                    values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
-                    if all(isinstance(value, ast.Constant) and isinstance(value.value, (int, float)) for value in values):
-                        yield from ((f"contin.{room}.{path.stem}", name) for name in names if name.startswith("_"))
+    for path in sorted((ROOT / "contin").glob("*/*.py")):
+        if path.parent.name in OTHERS:
+            continue
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.Assign):
+                names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+                values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+                if all(isinstance(value, ast.Constant) and isinstance(value.value, (int, float)) for value in values):
+                    yield from ((f"contin.{path.parent.name}.{path.stem}", name) for name in names if name.startswith("_"))
 
 
 def bank() -> dict[str, int]:
