@@ -111,6 +111,24 @@ def test_vibrations():
     assert outside == pytest.approx(0, abs=1e-10)
 
 
+def test_with_a_modulus_about_the_normal():
+    """M**2/g - (1 + t/g) M + t (1 - k**2) = 0 at both thresholds; a ring turns about its centreline where M = g."""
+    g, numbers = 2.0, {**NUMBERS, "side": 2.0}
+    law = Law.of_energy(
+        "quartic with a side", lambda w1, w2, w3, kappa_n, twist, core, side: (
+            energy(w1, w2, w3, kappa_n, twist, core) + side * w2**2 / 2
+        ), {**LAW.parameters, "side": Parameter()}, constrained=False,
+    )  # fmt: skip
+    moments = np.roots([1 / g, -(1 + TWIST / g), TWIST * (1 - 2**2)])
+    expected = sorted((1 - bending(moment) for moment in moments), key=lambda kappa_n: abs(kappa_n - 1))
+    assert thresholds(law, 1, 2, numbers) == pytest.approx(expected, rel=1e-13)
+    assert energy_interval(law, 1, numbers) == pytest.approx((1 - bending(g), expected[0]), rel=1e-13)
+    for kappa_n in (expected[0] - 0.01, expected[0] + 0.01):
+        assert stability.index(equilibrium_of_circle(law, numbers, 1, kappa_n)).index == index(law, 1, kappa_n, numbers)
+    system, x, _ = primary_branch(law, 1, 2, numbers)
+    assert x[system.parameter_index("kappa_n")] == pytest.approx(expected[0], abs=1e-9)
+
+
 def test_another_unit_of_length():
     """A strip of half the length, in its own units: curvatures are doubled, and the core is halved."""
     assert LAW.scaled(NUMBERS, 2.0) == {"twist": TWIST, "core": CORE / 2}
