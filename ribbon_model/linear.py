@@ -39,8 +39,8 @@ def thresholds(law: Law, m: int, n: int, parameters: float | Mapping[str, float]
     """Return the values of kappa_n (L = 2 pi) where the mode of wavenumber n leaves the m-covered circle: m K, b = 0 in (25b).
 
     One value for the ribbon (equation (27)) and the flat rod, two for the isotropic rod; the law 'finite width' may have a
-    second one, far from the natural state. The nearest to kappa_n = m comes first. With k = n/m, M = 1 - K and g infinite, b = 0
-    reads 1 - K = t (1 - k^2); nu -> 0 is a removable singularity of (27).
+    second one, far from the natural state. The nearest to kappa_n = m comes first. With k = n/m, M = 1 - K and g infinite,
+    b = 0 reads 1 - K = t (1 - k^2); nu -> 0 is a removable singularity of (27).
 
     Parameters
     ----------
