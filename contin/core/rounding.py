@@ -19,6 +19,9 @@ NEAR_CIRCLE = 1e-6
 #: That of an eigenvalue, where its real part is below this part of the largest eigenvalue: it is 1e-15 in chains of masses.
 #: Ten times larger, it is looked at for nothing where a matrix has eigenvalues of very different size.
 NEAR_AXIS = 1e-9
+#: Round-off of a number, relative to 1 + its size: a parameter that differs by no more is the same at two points, and no error
+#: is given as less. It is 16 units in the last place, as sums over a mesh lose a digit.
+LAST_PLACES = 16 * float(np.finfo(float).eps)
 #: Random roundings, and the seed that draws them. The largest change of ten is at most twice that of three.
 _DRAWS, _SEED = 3, 13
 #: A real part is zero if it is below so many times the largest change. With three draws the change is a tenth of the round-off

@@ -33,6 +33,7 @@ from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import finding_of, frequency_of
 from contin.events.nearness import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.normal_forms import flip, pair
+from contin.events.refinement import ASIDE
 from contin.events.significance import on_finer_mesh
 from contin.events.zeros import separated
 
@@ -42,9 +43,6 @@ _ONE = 1e-5
 #: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
 #: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
 _NEARLY_ONE = 1e-9
-#: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
-#: a tenth of their value where the step is a thousand times longer.
-_ASIDE = 1e-5
 #: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
 #: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
@@ -119,9 +117,9 @@ def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float]
         return 0.0
     error, rate = np.linalg.norm(known, axis=0)
     cycles: Any = system.solution
-    beside = x + _ASIDE * tangent
+    beside = x + ASIDE * tangent
     values, trivial = cycles.eigenvalues(x[: cycles.size]), _trivial(cycles, x[: cycles.size])
-    changes: Array = _apart(values, cycles.eigenvalues(beside[: cycles.size])) / _ASIDE
+    changes: Array = _apart(values, cycles.eigenvalues(beside[: cycles.size])) / ASIDE
     distance = error / rate if rate > 0 else 0.0
     if fold:
         place = min((i for i in range(len(values)) if i != trivial), key=lambda i: abs(values[i]))

@@ -18,19 +18,16 @@ from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Carrier, Discretization
+from contin.core.rounding import LAST_PLACES
 from contin.core.trial import Trial
 from contin.errors import ConvergenceError
 from contin.events.labelled import finding_of
-from contin.events.refinement import zero_again
+from contin.events.refinement import ASIDE, zero_again
 from contin.events.usual import fold
 
 #: The change from one mesh to the next is multiplied by this: the finer one has an error, too, 1/16 of the coarser one's at
 #: degree 2 and less at higher degrees. It covers both also where the meshes are so coarse that it is a third.
 _FINER = 1.5
-#: An error is no less than so many units in the last place of 1 + the number: sums over a mesh lose a digit.
-_UNITS = 16
-#: Step along the tangent, in units of the arclength, over which numbers are compared: rates are then right to about this part.
-_ALONG = 1e-5
 
 
 class Solution(Protocol):
@@ -92,7 +89,7 @@ def error(point: Solution, functional: Functional, apart: Apart = lambda a, b: n
     True
     """
     here = np.asarray(functional(Trial.without_tangent(point.system, point.x)))
-    left = (point.newton_error + _UNITS * np.finfo(float).eps) * (1 + np.abs(here))
+    left = (point.newton_error + LAST_PLACES) * (1 + np.abs(here))
     try:
         change = _of_mesh(point, functional, here, apart)
     except ConvergenceError:
@@ -136,6 +133,6 @@ def _of_place(point: Solution, functional: Functional, here: Array, apart: Apart
     located = point.errors.get(name, 0.0)
     if not located or point.label in (Label.FOLD, Label.BRANCH_POINT) or not np.isfinite(point.tangent).all():
         return 0.0
-    beside = Trial.without_tangent(system, point.x + _ALONG * point.tangent)
+    beside = Trial.without_tangent(system, point.x + ASIDE * point.tangent)
     moved = abs(beside[name] - Trial.without_tangent(system, point.x)[name])
     return apart(np.asarray(functional(beside)), here) / moved * located if moved else np.nan

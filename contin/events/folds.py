@@ -16,9 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.core.protocol import inner
+from contin.core.rounding import LAST_PLACES
 from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
+from contin.events.branch_points import OUTSIDE
+from contin.events.nearness import DEEPER
 from contin.events.significance import passed_before, senses
 from contin.events.zeros import followed
 from contin.functions.kernel_parts import helper
@@ -27,15 +30,9 @@ from contin.functions.kernel_parts import helper
 _ROUND_OFF = 1e-9
 #: A smallest rate within this part of those at the ends is zero to round-off: an inflection, not two folds.
 _FLAT = 1e-15
-#: Units in the last place by which a parameter may differ between two points where it is the same.
-_UNITS = 16
-#: A rate that sinks to this part of its values at the ends may pass zero.
-_SHALLOW = 0.5
 #: The rate right beside a pitchfork's fold is taken at this part of the step from it. Closer, tangents are blurred; further
 #: away, another fold would be between.
 _ASIDE = 1e-2
-#: A branch point may be located this part of the step outside of it (as in `contin.events.branch_points`).
-_OUTSIDE = 1e-6
 #: A rate at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
 _BESIDE = 0.05
 
@@ -66,14 +63,14 @@ class _Parabola(NamedTuple):
 @helper
 def dips(first: float, last: float, linear: float, square: float) -> bool:
     """Return whether a parabola comes near zero between the places."""
-    return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * min(first, last)
+    return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < DEEPER * min(first, last)
 
 
 @helper
 def ends_low(first: float, last: float, linear: float, square: float) -> bool:
     """Return whether it is near zero at one place already, and lower beside it."""
     inwards = linear if first < last else -linear - 2 * square
-    return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
+    return min(first, last) < _BESIDE * square and inwards < DEEPER * square
 
 
 def may_turn(arc: Arc, fold: Event) -> bool:
@@ -104,7 +101,7 @@ class FoldSearch:
     def __init__(self, arc: Arc, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:
         self.arc, self.fold, self.pitchfork = arc, fold, pitchfork
         self._index = arc.trial.system.parameter_index(fold.name)
-        self._outside = _OUTSIDE * arc.step
+        self._outside = OUTSIDE * arc.step
 
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
@@ -142,7 +139,7 @@ class FoldSearch:
     def _differs(self, one: Trial, other: Trial) -> bool:
         """Return whether the parameter differs between two points by more than round-off."""
         p, q = one.x[self._index], other.x[self._index]
-        noise = _UNITS * np.finfo(float).eps + one.newton_error + other.newton_error
+        noise = LAST_PLACES + one.newton_error + other.newton_error
         return bool(abs(p - q) > noise * (1 + abs(p)))
 
     def between(self, left: Place, right: Place) -> list[SpecialPoint]:

@@ -50,21 +50,17 @@ _STATIONARY = 1e-7
 #: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
 #: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
 _COINCIDENT = 1e-10
-#: The same on a mesh: where zero and special point coincide in the problem, they differ by the error of the discretization.
+#: The same on a mesh: where zero and special point coincide in the problem, they differ by the error of the discretization. The
+#: branch point where a branch ends on the trivial one has the trivial quantity at zero to this part; another one has not.
 _NEARLY = 1e-6
 #: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
 _BESIDE = 1e-4
-#: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
-#: ends of the step; another branch point inside the step has not.
-_TRIVIAL = 1e-6
 _STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
 FEWEST = 3
-#: A closing branch comes back to its first point along its tangent there: with this cosine at least, ...
+#: A closing branch comes back to its first point along its tangent there: with this cosine at least.
 _SAME_WAY = 0.5
-#: ... and at a distance of this part of the step at most.
-_BACK = 0.1
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 REACH = 2
 #: Errors of a parameter at the first point of a run, relative to 1 + its size. A thousand times larger, steps that pass near
@@ -321,7 +317,7 @@ class Inspection:
         arc, name = self.arc, self.settings.trivial
         assert name is not None
         largest = max(abs(arc.before[name]), abs(arc.trial[name]))
-        zero = max(_TRIVIAL * largest, round_off(point.trial, name, arc.newton))
+        zero = max(_NEARLY * largest, round_off(point.trial, name, arc.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
             return False
         return arc.passes_by(point.trial.x, point.at)
@@ -341,8 +337,7 @@ class Inspection:
         if arc.state.accepted < FEWEST or found is None:
             return None
         system, trial, (at, x, tangent, first) = arc.state.system, arc.trial, found
-        off = arc.guess(at) - first
-        if np.sqrt(inner(system, off, off)) > _BACK * arc.step:
+        if not arc.passes_by(first, at):
             return None
         there = Trial(system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
         return SpecialPoint(at, Label.END, "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))

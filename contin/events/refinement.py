@@ -12,6 +12,7 @@ from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
+from contin.core.rounding import LAST_PLACES
 from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import standing_at
@@ -27,16 +28,15 @@ from contin.linalg.factors import Factors
 _FAR = 0.05
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
-#: An error is given as no less than so many units in the last place of the largest parameter.
-_UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
 #: Where it fails, the place is known as far as the function grows on both sides, with different signs: distances at which it
 #: is looked at grow by the first factor, its values at least by the second. Round-off does not grow, and a square root does by
 #: 3.2. The ± is too large by the square of the first at most.
 _WIDER, _GROWS = 10.0, 3.0
-#: Largest change of an unknown over which the slope of a test function is taken: the cube root of round-off.
-_ASIDE = 1e-5
+#: Distance over which slopes are taken, of an unknown or along the tangent: the cube root of round-off. In a canard explosion
+#: multipliers change by a tenth of their value where it is a thousand times longer.
+ASIDE = 1e-5
 #: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-15 on the first step.
 _FLAT = 1e-12
 #: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
@@ -97,7 +97,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         system = better.system
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
-        steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
+        steps = np.maximum(steps, LAST_PLACES * size.max())
         left = left + finding_of(found).round_off(system, settings.newton)
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             is_lost = last == np.inf
@@ -129,10 +129,10 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, se
         test = Event(Label.END, "start", lambda trial: trial[primary])
     if test.label != Label.FOLD:
         size = float(np.abs(along).max())
-        slope = _change(test, trial, along * (_ASIDE / size)) * size
+        slope = _change(test, trial, along * (ASIDE / size)) * size
         for move in moves:
             largest = float(np.abs(move).max())
-            move -= along * (_change(test, trial, move * (_ASIDE / largest)) * largest / slope if largest and slope else 0.0)
+            move -= along * (_change(test, trial, move * (ASIDE / largest)) * largest / slope if largest and slope else 0.0)
     added = np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
     return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
 
@@ -140,7 +140,7 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, se
 def _change(test: Event, trial: Trial, move: Array) -> float:
     """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
     ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
-    return (ends[0] - ends[1]) / (2 * _ASIDE)
+    return (ends[0] - ends[1]) / (2 * ASIDE)
 
 
 def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Trial, Any, Any]:
