@@ -168,7 +168,7 @@ def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -
 
 def _scene(primary: dict, event, reversal: str, settings: list[str]) -> ClosedScene:
     """Return the scene of a secondary branch: the fields of the primary one that are valid on another domain."""
-    kept = {name: primary[name] for name in ("law", "nu", "Gamma", "m", "n", "steps", "stability", "stride")}
+    kept = {name: primary[name] for name in ("law", "nu", "Gamma", "parameters", "m", "n", "steps", "stability", "stride")}
     kept["mesh"] = primary["mesh"]
     kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
     origin = {name: float(event[name]) for name in ("kappa_n", "kappa_star")} | {"mode": event["name"].decode()}

@@ -15,6 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 from branches.explore.packing import column, compressed
 from branches.explore.solutions import solutions
+from branches.scene.closed import ClosedScene, law_of
 from branches.scene.labels import ON_PAGE, kind_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
@@ -22,7 +23,7 @@ from branches.store.layout import CLOSED
 from branches.store.read import read_kind
 from contin.lowlevel import exact_text
 from ribbon_model.domains import DOMAINS
-from ribbon_model.laws import LAWS, from_label, label
+from ribbon_model.laws import LAWS
 from ribbon_model.linear import circle, covering, energy_interval, index
 from ribbon_model.solution import Solution
 
@@ -64,9 +65,9 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
     if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
         raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
-    marks = [_mark(event, branch.reason, config) for event in branch.events]
+    marks = [_mark(event, branch.reason, branch.scene) for event in branch.events]
     about = {
-        "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(config),
+        "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(branch.scene),
         "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
         "title": config["title"], "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"),
         "domain": config["domain"], "stop": branch.stop, "file": path.name, "config": branch.scene_text(),
@@ -76,16 +77,14 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
     return about | ({"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"]} if config["origin"] else {})
 
 
-def _family(config: dict) -> tuple:
-    """Return what the branches of one family share: the place of their law, Gamma (-1 without) and nu."""
-    Gamma = config["Gamma"]
-    return list(LAWS).index(config["law"]), -1.0 if Gamma is None else Gamma, config["nu"]
+def _family(scene: ClosedScene) -> tuple:
+    """Return what the branches of one family share: the place of their law, its parameters, nu, and the law in words."""
+    return list(LAWS).index(scene.law), -1.0 if scene.Gamma is None else scene.Gamma, scene.nu, scene.material
 
 
 def family_of(branches: list[dict]) -> dict:
     """Return the branches of one law and nu, as of `branch_of`, and the circles that they meet."""
-    number, Gamma, nu = branches[0]["family"]
-    law = label(list(LAWS)[number], None if Gamma < 0 else Gamma)
+    *_, nu, law = branches[0]["family"]
     branches = sorted(branches, key=lambda branch: (branch["m"] * branch["n"], branch["m"], "origin" in branch))
     ends = [end for branch in branches for end in branch["reach"]]
     coverings = {branch["m"] for branch in branches} | {branch["to"] for branch in branches if branch["to"] is not None}
@@ -103,15 +102,15 @@ def family_of(branches: list[dict]) -> dict:
 # --- branches -----------------------------------------------------------------------------------------------------
 
 
-def _mark(event, reason: str, config: dict) -> dict:
+def _mark(event, reason: str, scene: ClosedScene) -> dict:
     """A labelled point: its number, kind, and what it is called; kappa_n where it is on a circle."""
     name, place = event["name"].decode(), {"point": int(event["point"])}
     values = {column: float(event[column]) for column in _MAP}
     if not all(map(math.isfinite, values.values())):
         raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
-    kind = kind_of(event["label"].decode(), name, reason, bool(config["origin"]))
+    kind = kind_of(event["label"].decode(), name, reason, bool(scene.origin))
     if kind == "circle":
-        index = covering(LAWS[config["law"]], {"nu": config["nu"], "Gamma": config["Gamma"]}, **values)
+        index = covering(LAWS[scene.law], scene.law_parameters, **values)
         return place | {"kind": kind, "covering": index, "kappa_n": values["kappa_n"]}
     return place | {"kind": ON_PAGE.get(kind, "end"), "name": name}
 
@@ -153,8 +152,7 @@ def _channels(problem, solution: Solution, t: np.ndarray) -> np.ndarray:
 
 def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations: list[dict]) -> dict:
     """The planar m-covered circle, with its bifurcations among its points."""
-    material, Gamma = from_label(law)
-    parameters = {"nu": nu, "Gamma": Gamma}
+    material, parameters = law_of(law, nu)
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
         neutral += [m * end for end in energy_interval(material, m, parameters) if ends[0] < m * end < ends[1]]

@@ -14,10 +14,9 @@ import numpy as np
 
 from branches.graph.interpolation import places
 from branches.graph.stored import CLOSED_FORMAT, COLUMNS
-from branches.scene.closed import ClosedScene
+from branches.scene.closed import ClosedScene, law_of
 from branches.scene.labels import SPECIAL, common_index, kind_of
 from contin.lowlevel import exact_text
-from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 
 #: The format of diagrams of closed strips, the title of one without, and whether there is an exact solution.
@@ -53,7 +52,7 @@ class Course:
 
 def part(branch, file: str, numbers: object = None) -> Course:
     """Return the course of a primary branch from its file."""
-    family, special = _family(branch.config), _special(branch)
+    family, special = _family(branch.scene), _special(branch)
     nodes = [_node_of(event, family, branch) for event in special]
     return Course(family, file, branch.scene.name, nodes, _pieces_of(branch, special))
 
@@ -76,7 +75,7 @@ def add_branch(graph, branch, name: str) -> bool:
     """
     if not branch.config["origin"]:
         return add(graph, part(branch, name))
-    family, special = _family(branch.config), _special(branch)
+    family, special = _family(branch.scene), _special(branch)
     nodes = _nodes_of_secondary(graph, special, family, branch)
     start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
     if any(data.get("domain") == family["domain"] for _, _, data in start):
@@ -89,11 +88,11 @@ def add(graph, course: Course) -> bool:
     return connect(graph, course.family, course.nodes, course.pieces, file=course.file)
 
 
-def _family(config: dict) -> dict:
+def _family(scene: ClosedScene) -> dict:
     """Return what the edges of a branch have in common."""
-    family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
-    if config["origin"]:
-        family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
+    family = {"law": scene.material, "nu": scene.nu, "m": scene.m, "n": scene.n}
+    if scene.origin:
+        family |= {"origin": scene.origin.kappa_n, "mode": scene.origin.mode, "domain": scene.domain}
     return family
 
 
@@ -188,9 +187,9 @@ def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
-        law, Gamma = from_label(family["law"])
-        parameters = {"nu": family["nu"], "Gamma": Gamma}
-        index = covering(law, parameters, *(attributes[name] for name in ("kappa_n", "kappa_star", "energy")))
+        index = covering(
+            *law_of(family["law"], family["nu"]), *(attributes[name] for name in ("kappa_n", "kappa_star", "energy"))
+        )
         return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
     branch = f"({family['m']},{family['n']})"
     if origin:
@@ -314,8 +313,8 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
 
 def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
     """Return kappa* and energy of a planar circle."""
-    material, Gamma = from_label(law)
-    values = circle(material, m, kappa_n, {"nu": nu, "Gamma": Gamma})
+    material, parameters = law_of(law, nu)
+    values = circle(material, m, kappa_n, parameters)
     return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
 
 

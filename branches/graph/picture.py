@@ -185,11 +185,10 @@ def _coverings(graph, law, nu):
 
 def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> None:
     """The planar circles, solid where the published linear theory has them stable, dashed elsewhere; all level if asked for."""
-    from ribbon_model.laws import from_label
+    from branches.scene.closed import law_of
     from ribbon_model.linear import circle, stability_interval
 
-    material, Gamma = from_label(law)
-    parameters = {"nu": nu, "Gamma": Gamma}
+    material, parameters = law_of(law, nu)
 
     def plot(m, ends, **style):
         height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in ends]

@@ -45,7 +45,7 @@ def preview(scene: Scene | Sweep, step: float = 0.2):
         if diagram.holds_circle(graph, one.material, one.nu, one.m, one.n):
             continue  # a duplicate, from its other end
         try:
-            points = exact.curve(one.m, one.n, one.parameters, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
+            points = exact.curve(one.m, one.n, one.law_parameters, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
         except (ValueError, RuntimeError) as error:
             failed[f"{one.material}, nu = {exact_text(one.nu)}, ({one.m}, {one.n})"] = str(error)
             continue

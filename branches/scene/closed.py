@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, plain, show
 from branches.scene.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
-from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
+from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, Law
 
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
@@ -22,16 +23,45 @@ class OriginConfig(Strict):
     mode: str = Field(description="class of the critical mode: the name of the labelled point SB on the primary branch")
 
 
+def _known_law(name: str) -> str:
+    if name not in LAWS:
+        *others, last = map(repr, LAWS)
+        raise ValueError(f"must be {', '.join(others)} or {last}, not {name!r}")
+    return name
+
+
+def _further(Gamma: float | None, parameters: Mapping[str, float]) -> list[tuple[str, float]]:
+    return [*([] if Gamma is None else [("Gamma", Gamma)]), *parameters.items()]
+
+
+def _material(law: str, Gamma: float | None, parameters: Mapping[str, float]) -> str:
+    return ", ".join([law, *(f"{name} = {value:.12g}" for name, value in _further(Gamma, parameters))])
+
+
+def law_of(material: str, nu: float) -> tuple[Law, dict[str, float]]:
+    """Return a law and its parameters from `ClosedScene.material`, by which diagrams know them, and nu.
+
+    Examples
+    --------
+    >>> law_of("finite width, Gamma = 30", 0.3)
+    (<law 'finite width'>, {'nu': 0.3, 'Gamma': 30.0})
+    """
+    name, *given = material.split(", ")
+    law = LAWS[name]
+    pairs = (one.split(" = ") for one in given)
+    return law, ({"nu": nu} if "nu" in law.parameters else {}) | {key: float(value) for key, value in pairs}
+
+
 class ClosedScene(Scene):
     """One branch: that of the mode of wavenumber n on the m-covered circle, or a secondary branch that leaves it."""
 
     KIND: ClassVar[str] = "closed strip"
-    LISTS: ClassVar[tuple] = (("law",), ("Gamma",), ("nu",), ("m",), ("n",))
+    LISTS: ClassVar[tuple] = (("law",), ("Gamma",), ("parameters", "*"), ("nu",), ("m",), ("n",))
     PAIRS: ClassVar[bool] = True
     CHANGEABLE: ClassVar[tuple[str, ...]] = ("title", "limits", "zeros", "stride", "steps.max_points")
 
     title: str = ""
-    law: Literal[*LAWS] = RIBBON.name
+    law: Annotated[str, AfterValidator(_known_law)] = RIBBON.name
     nu: float = Field(0.3, gt=-1, le=0.5, description="Poisson's ratio")
     Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
@@ -49,6 +79,7 @@ class ClosedScene(Scene):
     strip: dict[str, Annotated[float, Field(allow_inf_nan=True)]] | None = Field(
         None, description="dimensions in SI units, from which law, nu and Gamma follow"
     )
+    parameters: dict[str, float] = Field(default_factory=dict, description="further parameters of the law, by name")
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
@@ -91,24 +122,26 @@ class ClosedScene(Scene):
         """
         from ribbon_model.linear import circle, thresholds
 
-        law, parameters = LAWS[self.law], self.parameters
+        law, parameters = LAWS[self.law], self.law_parameters
         kappa_n = thresholds(law, self.m, self.n, parameters)[0]
         return {"kappa_n": kappa_n, "M2": 0.0, **circle(law, self.m, kappa_n, parameters)}
 
     @property
-    def parameters(self) -> dict[str, float | None]:
+    def law_parameters(self) -> dict[str, float | None]:
         """The parameters of the law by name; None: not given."""
-        return {"nu": self.nu, "Gamma": self.Gamma}
+        nu = {"nu": self.nu} if "nu" in LAWS[self.law].parameters or "nu" in self.model_fields_set else {}
+        return nu | {"Gamma": self.Gamma} | self.parameters
 
     @property
     def material(self) -> str:
-        """The name of the law, with its Gamma if it has one."""
-        return label(self.law, self.Gamma)
+        """The name of the law, with its parameters besides nu; `law_of` reads it back."""
+        return _material(self.law, self.Gamma, self.parameters)
 
     @property
     def name(self) -> str:
         what = "secondary branch from " if self.origin else ""
-        return f"{self.material}, {what}(m, n) = ({self.m}, {self.n}), nu = {exact_text(self.nu)}"
+        nu = f", nu = {exact_text(self.nu)}" if "nu" in LAWS[self.law].parameters else ""
+        return f"{self.material}, {what}(m, n) = ({self.m}, {self.n}){nu}"
 
     @property
     def heading(self) -> str:
@@ -147,9 +180,9 @@ class ClosedScene(Scene):
 
     def _stem(self, m: int) -> str:
         law = self.law.replace(" ", "_")
-        if self.Gamma is not None:
-            law += f"_Gamma{self.Gamma:.12g}"
-        return f"{law}_nu{exact_text(self.nu)}_m{m}_n{self.n}"
+        law += "".join(f"_{name}{value:.12g}" for name, value in _further(self.Gamma, self.parameters))
+        nu = f"_nu{exact_text(self.nu)}" if "nu" in LAWS[self.law].parameters else ""
+        return f"{law}{nu}_m{m}_n{self.n}"
 
     @classmethod
     def prepared(cls, values: dict) -> dict:
@@ -185,7 +218,8 @@ class ClosedScene(Scene):
         whole = type(m) is int and type(n) is int and m > 0 and n > 0
         if whole and (m == n or (fields.get("domain", "cell") == "cell" and m % (2 * n) == 0)):
             return None
-        wide = [law for law in lists.get(("law",), [fields.get("law", RIBBON.name)]) if law in LAWS and LAWS[law].has_width]
+        laws = lists.get(("law",), [fields.get("law", RIBBON.name)])
+        wide = [name for name, law in LAWS.items() if law.has_width and name in laws]
         if "Gamma" in fields and wide and fields.get("law") not in wide:
             first = lists.get(("Gamma",), [fields["Gamma"]])[0]
             return {key: value for key, value in fields.items() if key != "Gamma"} if fields["Gamma"] == first else None
@@ -193,7 +227,7 @@ class ClosedScene(Scene):
 
     @classmethod
     def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
-        law = label(fields.get("law", RIBBON.name), fields.get("Gamma"))
+        law = _material(fields.get("law", RIBBON.name), fields.get("Gamma"), fields.get("parameters", {}))
         return f"{law}, nu = {exact_text(fields.get('nu', 0.3))}, ({fields['m']}, {fields['n']})"
 
     @classmethod

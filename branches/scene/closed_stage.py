@@ -124,7 +124,7 @@ class ClosedStage(Stage):
             return dataclasses.replace(point, label="EP", name="primary branch")
         if point.name != "trivial branch":
             return point
-        index = covering(self.law, self.scene.parameters, point["kappa_n"], point["kappa_star"], point["energy"])
+        index = covering(self.law, self.scene.law_parameters, point["kappa_n"], point["kappa_star"], point["energy"])
         if is_threshold(self.scene, index, point["kappa_n"], point.errors.get("kappa_n", math.nan)):
             return point
         run.stop = Stop(
@@ -198,7 +198,7 @@ class ClosedStage(Stage):
             return f"leaves the {scene.m}-covered circle at {place}{certain}"
         if name == "trivial branch":
             columns = (float(event[name]) for name in ("kappa_n", "kappa_star", "energy"))
-            index = covering(self.law, scene.parameters, *columns)
+            index = covering(self.law, scene.law_parameters, *columns)
             inside_out = ", curled against its natural curvature" if index < 0 else ""
             return f"ends on the {abs(index)}-covered circle{inside_out} at {place}{certain}"
         what = f" ({name})" if name and label != b"LP" else ""
@@ -216,7 +216,7 @@ def is_threshold(scene: ClosedScene, index: int, kappa_n: float, error: float) -
     ``index`` is the covering index of the circle, negative if it is curled against its natural curvature.
     """
     try:
-        known = thresholds(LAWS[scene.law], index, scene.n, scene.parameters)
+        known = thresholds(LAWS[scene.law], index, scene.n, scene.law_parameters)
     except (ValueError, ZeroDivisionError):
         return False
     allowed = max(_SAME * (1 + abs(kappa_n)), 0.0 if math.isnan(error) else _ESTIMATES * error)
@@ -255,7 +255,7 @@ def seed(scene: ClosedScene):
     )
     try:
         system, x, tangent = _SEEDS[scene.domain](
-            LAWS[scene.law], scene.m, scene.n, scene.parameters, scene.mesh.intervals, scene.mesh.degree
+            LAWS[scene.law], scene.m, scene.n, scene.law_parameters, scene.mesh.intervals, scene.mesh.degree
         )
     except TwoBendings as error:
         raise ConfigError(f"n: {error}") from error
@@ -288,7 +288,9 @@ def _leave_primary(scene: ClosedScene):
 def _at_origin(scene: ClosedScene):
     """Return the point of the primary branch."""
     origin = scene.origin
-    primary = ClosedScene(law=scene.law, nu=scene.nu, Gamma=scene.Gamma, m=scene.m, n=scene.n, mesh=scene.mesh)
+    primary = ClosedScene(
+        law=scene.law, nu=scene.nu, Gamma=scene.Gamma, parameters=scene.parameters, m=scene.m, n=scene.n, mesh=scene.mesh
+    )  # fmt: skip
     reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
     primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
     system, x, tangent = seed(primary)

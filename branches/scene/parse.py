@@ -101,17 +101,16 @@ def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str,
         fields = kind.combination(whole, lists)
         if fields is None:
             continue
-        words = kind.words_of(fields, chosen)
         try:
             one = kind.model_validate(fields)
         except ValidationError as error:
             if error.errors()[0]["loc"]:
                 raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, kind)}") from error
-            absent[words] = _sentence(error, kind)
+            absent[kind.words_of(fields, chosen)] = _sentence(error, kind)
             continue
         file = one.file_of(chosen)
         if file in scenes:
-            raise ValueError(kind.same_name(words, scenes[file], one))
+            raise ValueError(kind.same_name(kind.words_of(fields, chosen), scenes[file], one))
         scenes[file], numbers[file] = one, chosen
     if not scenes:
         reason = next(iter(absent.values()), "n = m is a rigid rotation")

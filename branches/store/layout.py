@@ -18,7 +18,7 @@ CLOSED, OPEN = "closed strip", "open strip"
 #: Columns that every reader may count on, whatever the version that wrote them.
 _COLUMNS = {
     CLOSED: {
-        "points": ("point", "label", "arclength", "kappa_n", "kappa_star", "energy", "nu", "M1", "M2", "length"),
+        "points": ("point", "label", "arclength", "kappa_n", "kappa_star", "energy", "M1", "M2", "length"),
         "events": ("point", "label", "name", "kappa_n", "kappa_star", "energy", "error_kappa_n"),
     },
     OPEN: {

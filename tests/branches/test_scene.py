@@ -12,12 +12,16 @@ from branches.explore.gather import gather
 from branches.graph.kinds import graph_kind
 from branches.graph.stored import new_graph, save
 from branches.run.display import Display
+from branches.run.many import run_many
 from branches.run.runner import run_scene
 from branches.scene.closed_stage import ClosedStage
 from branches.scene.columns import FOUND, Column, error_of
+from branches.scene.fields import ConfigError
 from branches.scene.parse import load, parse
 from branches.scene.stages import stages_of
 from branches.store.read import read_branch
+from ribbon_model import laws
+from ribbon_model.law import Law, Parameter
 
 COARSE = "mesh: {degree: 5, tolerance: 1.0e-7}\n"
 
@@ -129,3 +133,30 @@ def test_any_column_of_an_open_strip_against_any_other(tmp_path, root):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("energy", "moment about the normal")
     with pytest.raises(Exception, match="there is no column 'M_up' of numbers"):
         branch.plot(shapes=0, y="M_up")
+
+
+def quartic(w1, w2, w3, kappa_n, twist, core):
+    bent = w1 - kappa_n
+    return bent**2 / 2 + core**2 * bent**4 / 4 + twist * w3**2 / 2 - kappa_n**2 / 2
+
+
+def test_a_law_of_ones_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_path, monkeypatch):
+    """It has a length of its own and no nu. (1, 2) leaves the circle where M r0 = t (1 - n^2/m^2) with the moment M there."""
+    law = Law.of_energy("quartic", quartic, {"twist": Parameter(), "core": Parameter(1)})
+    monkeypatch.setitem(laws.LAWS, law.name, law)
+    text = "law: quartic\nm: 1\nn: 2\nparameters: {twist: 1.5, core: [0.1, 0.4]}\nlimits: {kappa_n: [-10, 10]}\n"
+    sweep = parse(text + COARSE, "scene")
+    assert list(sweep.scenes) == ["quartic_twist1.5_core0.1_m1_n2.h5", "quartic_twist1.5_core0.4_m1_n2.h5"]
+    assert run_many(sweep, tmp_path, Display(silent=True), workers=1) == "complete"
+    for file, core in zip(sweep.scenes, (0.1, 0.4)):
+        start = read_branch(tmp_path / file).events[0]
+        bent = 1 - start["kappa_n"]
+        assert bent + core**2 * bent**3 == pytest.approx(1.5 * (1 - 2**2), rel=1e-9)
+    page = gather([str(tmp_path)])
+    assert [family["law"] for family in page["families"]] == [
+        "quartic, twist = 1.5, core = 0.1",
+        "quartic, twist = 1.5, core = 0.4",
+    ]
+    assert all(len(family["circles"]) == 2 for family in page["families"])
+    with pytest.raises(ConfigError, match="twist"):
+        parse(text.replace("twist: 1.5, ", ""), "scene")
