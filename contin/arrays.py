@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+#: Real or complex ones.
+Numbers = NDArray[np.float64] | NDArray[np.complex128]
 Indices = NDArray[np.int64]
 #: One truth value an entry.
 Mask = NDArray[np.bool_]

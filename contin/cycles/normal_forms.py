@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 from contin.core.multilinear import of_complex
 from contin.cycles.equations import PeriodicEquations
 from contin.cycles.map_equations import MapEquations
@@ -95,11 +95,11 @@ class CycleForm(Form):
         other.weights = self.system.weights[other.places]
         return other
 
-    def solver(self, coupling: Any, border: Borders | None = None) -> Solver:
+    def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> Solver:
         """Return the solver of a round."""
         return self._around.solver(coupling, border)
 
-    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+    def coupled_parts(self, left: Numbers, right: Numbers) -> tuple[Numbers, Numbers]:
         """Return the part of w that belongs to the condition between the ends of the round, and S v(0)."""
         n, size = self.system.states_count, self.system.state_size
         return left[..., size - n : size], right[..., :n] @ self.system.turn.T
@@ -112,7 +112,7 @@ class CycleForm(Form):
         """Return one over the unit of time."""
         return 1 / self.system.unit_time(self.x)
 
-    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+    def normalized(self, left: Numbers, right: Numbers) -> tuple[Any, Direction]:
         """Return w and v, normal to u0' where a multiplier is one."""
         size, system = self.system.state_size, self.system
         if len(right) > size:
@@ -123,9 +123,9 @@ class CycleForm(Form):
         v = self._direction(right / np.sqrt(self._mean(right, right.conj()).real))
         return left / self.product(left, v.states), v
 
-    def solve(self, rate: complex, values: Any) -> Direction:
+    def solve(self, rate: complex, values: Numbers) -> Direction:
         """Return the h with L h = values."""
-        right = np.zeros(self.equations, dtype=values.dtype)
+        right: Any = np.zeros(self.equations, dtype=values.dtype)
         right[: values.size] = (self._widths * values).ravel()
         return self._direction(self.solver(self.coupling(rate)).solve(right))
 
@@ -134,11 +134,11 @@ class CycleForm(Form):
         along = self.system.rates_along
         return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)
 
-    def product(self, left: Any, values: Any) -> complex:
+    def product(self, left: Numbers, values: Numbers) -> complex:
         """Return w.values."""
         return complex(left[: values.size] @ (self._widths * values).ravel())
 
-    def along_time(self, states: Any) -> Any:
+    def along_time(self, states: Numbers) -> Any:
         """Return J v at the Gauss points."""
         return np.einsum("kij,kj->ki", self._jacobian, states)
 
@@ -154,13 +154,13 @@ class CycleForm(Form):
     def _widths(self) -> Array:
         return np.repeat(np.diff(self.system.mesh), self.system.degree)[:, None]
 
-    def _mean(self, v: Any, w: Any) -> Any:
+    def _mean(self, v: Numbers, w: Numbers) -> Any:
         """Return the mean of v.w over the period, in the user's units."""
         size = self.system.state_size
         weights = self.system.weights[:size] * self.system.unscaled_factors[:size] ** 2
         return weights @ (v[:size] * w[:size])
 
-    def _direction(self, v: Any) -> Direction:
+    def _direction(self, v: Numbers) -> Direction:
         """Return the states at the nodes, interpolated to the Gauss points, and the change of the period."""
         system, n, size = self.system, self.system.states_count, self.system.state_size
         local = v[:size].reshape(-1, n)[system.by_interval]

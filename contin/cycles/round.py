@@ -37,7 +37,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 from contin.cycles.equations import PeriodicEquations
 from contin.problems.own_names import PERIOD
 
@@ -216,6 +216,6 @@ class Round:
         by_period = self.system.parameter_columns(self._x, (PERIOD,))[: self.collocated.inside]
         return -self.collocated.solve(by_period.T)
 
-    def solver(self, coupling: Array, border: tuple[Array, Array] | None = None) -> Solver:
+    def solver(self, coupling: complex | Numbers, border: tuple[Array, Array] | None = None) -> Solver:
         """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""
         return Solver(self, np.atleast_2d(coupling), border)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Numbers
 from contin.equilibria.equations import AlgebraicEquations
 from contin.events.normal_forms import DenseForm
 
@@ -40,7 +40,7 @@ class EquilibriumForm(DenseForm):
         """Return one over the frequency."""
         return 1j / rate
 
-    def length(self, right: Any) -> float:
+    def length(self, right: Numbers) -> float:
         """Return the length of v in the user's units."""
         return float(np.linalg.norm(right * self._sizes))
 
@@ -84,4 +84,4 @@ def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPa
     with np.errstate(all="ignore"):
         left, (right, _) = EquilibriumForm(jacobian, np.ones(len(jacobian)), lambda _: jacobian).critical(1j * frequency)
         off = np.linalg.norm(jacobian @ right - 1j * frequency * right) / abs(frequency)
-        return CriticalPair(frequency, right, left, float(off))
+        return CriticalPair(frequency, np.asarray(right, complex), np.asarray(left, complex), float(off))

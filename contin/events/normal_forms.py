@@ -24,11 +24,11 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from contin.arrays import Array, Indices
+from contin.arrays import Array, Indices, Numbers
 from contin.core.multilinear import of_complex
 from contin.core.system import System
 from contin.events.arc import SpecialPoint
@@ -41,7 +41,7 @@ from contin.linalg.orientation import oriented
 class Direction(NamedTuple):
     """A direction at all places where the forms are evaluated, and the change of the period along it, as a part of that."""
 
-    states: Any
+    states: Numbers
     stretch: float = 0.0
 
 
@@ -71,14 +71,14 @@ class Form(ABC):
         return self
 
     @abstractmethod
-    def solver(self, coupling: Any, border: Borders | None = None) -> Solves:
+    def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> Solves:
         """Return the solver of L(P), bordered in each copy where a border is given: [copies | columns of all copies]."""
 
     @abstractmethod
-    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+    def coupled_parts(self, left: Numbers, right: Numbers) -> tuple[Numbers, Numbers]:
         """Return the parts of w and v (..., unknowns) whose product is w.E v, where L(P) depends on P by -P E."""
 
-    def coupled(self, left: Array, right: Array) -> Any:
+    def coupled(self, left: Numbers, right: Numbers) -> Any:
         """Return w.E v."""
         one, other = self.coupled_parts(left, right)
         return (one * other).sum(axis=-1)
@@ -92,11 +92,11 @@ class Form(ABC):
         """Return what the coefficient is multiplied by."""
 
     @abstractmethod
-    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+    def normalized(self, left: Numbers, right: Numbers) -> tuple[Any, Direction]:
         """Return w and v from null vectors, with v of unit length, w.v = 1, and at folds v across the solution itself."""
 
     @abstractmethod
-    def solve(self, rate: complex, values: Any) -> Direction:
+    def solve(self, rate: complex, values: Numbers) -> Direction:
         """Return the h with L h = values, which are given where the forms are evaluated."""
 
     @abstractmethod
@@ -104,10 +104,10 @@ class Form(ABC):
         """Return B or C along real or complex directions."""
 
     @abstractmethod
-    def product(self, left: Any, values: Any) -> complex:
+    def product(self, left: Numbers, values: Numbers) -> complex:
         """Return w.values."""
 
-    def along_time(self, states: Any) -> Any:
+    def along_time(self, states: Numbers) -> Any:
         """Return J v: what B(v, h) grows by with the stretch of h."""
         return np.zeros_like(states)
 
@@ -140,7 +140,7 @@ class DenseForm(Form):
         size = self.equations = len(matrix)
         self._open, self._along, self._count, self.weights, self.places = matrix, along, count, weights, np.arange(size)
 
-    def solver(self, coupling: Any, border: Borders | None = None) -> DenseFactors:
+    def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> DenseFactors:
         """Return LU factors of L(P)."""
         small, size, n = np.atleast_2d(coupling), self.equations, self._count
         copies, rows, columns = len(small), np.arange(size - n, size), np.arange(n)
@@ -155,29 +155,29 @@ class DenseForm(Form):
                 matrix[i * size : (i + 1) * size, last], matrix[last, i * size : (i + 1) * size] = border
         return DenseFactors(matrix)
 
-    def coupled_parts(self, left: Array, right: Array) -> tuple[Array, Array]:
+    def coupled_parts(self, left: Numbers, right: Numbers) -> tuple[Numbers, Numbers]:
         """Return the last equations of w and the first unknowns of v."""
         return left[..., self.equations - self._count :], right[..., : self._count]
 
-    def solve(self, rate: complex, values: Any) -> Direction:
+    def solve(self, rate: complex, values: Numbers) -> Direction:
         """Return the h with -L h = values."""
-        coupling = self.coupling(rate)
-        return Direction(self.solver(np.asarray(coupling, np.result_type(coupling, values))).solve(-values))
+        coupling, right = self.coupling(rate), cast(Array, -values)
+        return Direction(self.solver(np.asarray(coupling, np.result_type(coupling, values))).solve(right))
 
     def along(self, *directions: Any) -> Any:
         """Return B or C along real or complex directions."""
         return of_complex(self._along, directions)
 
-    def product(self, left: Any, values: Any) -> complex:
+    def product(self, left: Numbers, values: Numbers) -> complex:
         """Return w.values."""
         return complex(left @ values)
 
-    def normalized(self, left: Any, right: Any) -> tuple[Any, Direction]:
+    def normalized(self, left: Numbers, right: Numbers) -> tuple[Any, Direction]:
         """Return w and v, with v of unit length in the first unknowns, and `oriented`."""
         v = oriented(right / self.length(right))
         return left / self.coupled(left, v), Direction(v)
 
-    def length(self, right: Any) -> float:
+    def length(self, right: Numbers) -> float:
         """Return the length of v."""
         return float(np.linalg.norm(right[: self._count]))
 
@@ -210,7 +210,7 @@ def pair(form: Form, frequency: float) -> Array:
     return _terms(form, rate, w, (*terms, 2 * stretch * (form.along_time(v) - rate * v)), 2)
 
 
-def _terms(form: Form, rate: complex, w: Any, terms: tuple[Any, ...], factor: int) -> Array:
+def _terms(form: Form, rate: complex, w: Numbers, terms: tuple[Any, ...], factor: int) -> Array:
     return np.array([(form.unit(rate) * form.product(w, term)).real for term in terms]) / factor
 
 

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 
 #: Rounds of inverse iteration from random borders; each divides the error by the ratio of the smallest singular values. With
 #: ten, the curves of the tests are the same.
@@ -125,12 +125,12 @@ def null_vectors(
     return found, borders
 
 
-def cosine(a: Array, b: Any) -> float:
+def cosine(a: Array, b: Numbers) -> float:
     """Return the absolute cosine between a real vector and a real or complex one."""
     return float(abs(a @ b) / np.sqrt((a @ a) * float(np.vdot(b, b).real)))
 
 
-def _largest_part(vector: Any) -> Array:
+def _largest_part(vector: Numbers) -> Array:
     """Return the real part, of unit length, of a vector: of a complex one, turned so that its real part is the largest."""
     if np.iscomplexobj(vector):
         vector = (vector * np.exp(-0.5j * np.angle(vector @ vector))).real
