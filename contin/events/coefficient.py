@@ -81,11 +81,12 @@ class Coefficient:
 
     @property
     def vanishes(self) -> bool:
-        """The terms cancel, or are round-off of derivatives of order one.
+        """The terms cancel, or are round-off of derivatives of order one, or no larger than their error: it is 1e18 at 1e-9.
 
         Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
         """
-        return abs(self.value) < _CANCELLED * self.size + _ZERO
+        small = abs(self.value) < _CANCELLED * self.size + _ZERO
+        return small or (self.size < _MODERATE and abs(self.value) <= self.error)
 
 
 #: Where nothing is known: at the ends of curves, and where it is infinite.

@@ -90,6 +90,24 @@ def test_generalized_hopf():
         assert point["lyapunov"] == pytest.approx(point["b"], abs=1e-10)
 
 
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-4, 1e9])
+@pytest.mark.parametrize("b", [-0.37, -0.51])
+def test_generalized_hopf_in_other_units(size, b):
+    """l1 = b / size**2: its only term vanishes with it, and 1e-16 of 1e18 is no small number."""
+
+    def field(u, p):
+        x, y = u.x / size, u.y / size
+        s = x * x + y * y
+        growth = p.mu + p.b * s - s * s
+        return size * (growth * x - 2 * y), size * (2 * x + growth * y)
+
+    problem = AlgebraicProblem(field, ["x", "y"], {"mu": -1.0, "b": b})
+    hopf = first_hopf(problem, [0, 0], "mu", limits={"mu": (-2, 2)})
+    found = contin.curve(hopf, free=["mu", "b"], limits={"b": (-1, 1)})
+    assert labels(found) == ["EP", "GH", "EP"]
+    assert found.labelled("GH")[0]["b"] == pytest.approx(0, abs=1e-10)
+
+
 def fold_hopf(u, p):
     growth = p.b + u.z
     return growth * u.x - 2 * u.y - u.x * u.z, 2 * u.x + growth * u.y, p.a - u.z**2 - u.x**2 - u.y**2
