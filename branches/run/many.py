@@ -154,7 +154,7 @@ def _stored_scenes(sweep: Sweep, folder: Path) -> Mapping[str, Scene]:
     try:
         stored = parse(read_any(folder).graph["config"], DIAGRAM)
         return stored.scenes
-    except (StoreError, ConfigError, KeyError, AttributeError) as error:
+    except (StoreError, ConfigError, KeyError) as error:
         raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {ANOTHER_DIAGRAM}") from error
 
 
