@@ -76,8 +76,12 @@ class Parameter(NamedTuple):
     stiffness: bool = False
 
 
-#: Poisson's ratio, which most laws have.
-NU = Parameter(0, lambda value: -1 < value <= 0.5, "greater than -1 and at most 0.5", 0.3)
+def _poisson(value: float) -> bool:
+    return -1 < value <= 0.5
+
+
+#: Poisson's ratio, which most laws have. What it fits is a function with a name: a law is sent to other processes.
+NU = Parameter(0, _poisson, "greater than -1 and at most 0.5", 0.3)
 
 
 class Circle(NamedTuple):
@@ -154,14 +158,16 @@ class Law:
     has_rulings: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        known = self.parameters if isinstance(self.parameters, Mapping) else {}
-        if len(known) != len(self.parameters) or not all(isinstance(each, Parameter) for each in known.values()):
+        known = self.parameters
+        if not (isinstance(known, Mapping) and all(isinstance(each, Parameter) for each in known.values())):
             raise ValueError(f"parameters: {self.parameters!r} must be a mapping of names to Parameter(...)")
         for name in known:
             if name in RESERVED or not name.isidentifier():
                 raise ValueError(f"parameters: {name!r} is a name of every strip, or not usable as a name; take another one")
         for what in ("energy", "hamiltonian"):
             function = getattr(self, what)
+            if not (callable(function) or (what == "energy" and function is None)):
+                raise ValueError(f"{what}: {function!r} must be a function")
             if function is not None and len(inspect.signature(function).parameters) != 4 + len(known):
                 named = ", ".join(["three moments" if what == "hamiltonian" else "three strains", "kappa_n", *known])
                 raise ValueError(f"{what}: must take {4 + len(known)} arguments: {named}")

@@ -190,11 +190,20 @@ class IsotropicRod(Law):
 
 # --- the laws by name -------------------------------------------------------------------------------------------------------
 
+
+def _positive(value: float) -> bool:
+    return value > 0
+
+
+def _from_zero(value: float) -> bool:
+    return value >= 0
+
+
 #: w**2/(h L/2 pi).
 _GAMMA = Parameter(
-    1, lambda value: value >= 0, "a finite number from 0; the limit of a wide strip is the law 'ribbon'", width=2, thickness=-1
+    1, _from_zero, "a finite number from 0; the limit of a wide strip is the law 'ribbon'", width=2, thickness=-1
 )
-_STIFFNESS = Parameter(0, lambda value: value > 0, "positive", stiffness=True)
+_STIFFNESS = Parameter(0, _positive, "positive", stiffness=True)
 _D12 = Parameter(0, default=0.3)
 _PLATE = dict(zip(plate.RIGIDITIES, (_STIFFNESS, _D12, _STIFFNESS, _STIFFNESS)))
 _FLAT_END = "whose energy is not convex at larger twist; the law 'flat rod' goes on"

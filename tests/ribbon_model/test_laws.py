@@ -1,6 +1,7 @@
 """The material laws: one scalar function each, and all that follows from it."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from ribbon_model.domains import DOMAINS
 from ribbon_model.ends import ANGLES, PLACE
 from ribbon_model.equilibrium import CENTRELINE, FRAME, LOADS
 from ribbon_model.law import RESERVED, Law, Parameter
-from ribbon_model.laws import PAPER_LAWS, RIBBON
+from ribbon_model.laws import OPEN_LAWS, PAPER_LAWS, RIBBON
 from ribbon_model.loads import LOADS as DEAD
 from ribbon_model.loads import STROKE
 from ribbon_model.section import DIMENSIONS, NATURAL, SOFTNESS
@@ -75,11 +76,19 @@ def test_statements_that_are_refused():
     for parameters, sentence in (
         (("core",), r"parameters: \('core',\) must be a mapping of names to Parameter"),
         ({"core": 1}, "parameters: {'core': 1} must be a mapping"),
+        (3, "parameters: 3 must be a mapping"),
         ({"length": Parameter(1)}, "parameters: 'length' is a name of every strip"),
         ({"core": Parameter(1), "more": Parameter()}, "energy: must take 6 arguments: three strains, kappa_n, core, more"),
     ):
         with pytest.raises(ValueError, match=sentence):
             Law.of_energy("own", energy, parameters)
+    with pytest.raises(ValueError, match="hamiltonian: 3 must be a function"):
+        Law("own", 3)
+
+
+@pytest.mark.parametrize("law", OPEN_LAWS.values(), ids=lambda law: law.name)
+def test_laws_are_sent_to_other_processes(law):
+    assert law.response and pickle.loads(pickle.dumps(law)) == law
 
 
 def test_reserved_names_are_those_of_strips():
