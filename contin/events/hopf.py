@@ -301,7 +301,7 @@ def _joined(found: list[SpecialPoint], arc: Arc) -> list[SpecialPoint]:
     """Return the points, those at one place joined."""
     result: list[SpecialPoint] = []
     for point in found:
-        if result and point.at - result[-1].at <= _TOGETHER * arc.step and point.trial is not result[-1].trial:
+        if result and point.at - result[-1].at <= _TOGETHER * arc.step:
             if _pairs_at(point) > result[-1].details["pairs"]:
                 result[-1].details["pairs"] += 1
         else:

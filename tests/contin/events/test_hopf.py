@@ -106,6 +106,18 @@ def test_pairs_that_cross_one_after_the_other(gap):
     assert all(abs(point["mu"] - exact) <= 10 * point.errors["mu"] < 1e-12 for point, exact in zip(points, (0, gap)))
 
 
+@pytest.mark.parametrize("start", [-1.0, -0.9, -0.73])
+@pytest.mark.parametrize(("w", "c"), [(2.0, 1.0), (1.5, 1.0), (2.0, 0.5)])
+def test_pairs_that_cross_at_one_place(start, w, c):
+    """Eigenvalues mu -+ i and c mu -+ w i: one point, also where both are located with the same bits."""
+    problem = AlgebraicProblem(
+        lambda u, p: (p.mu * u.a - u.b, u.a + p.mu * u.b, c * p.mu * u.c - w * u.d, w * u.c + c * p.mu * u.d),
+        ["a", "b", "c", "d"], {"mu": start},
+    )  # fmt: skip
+    (point,) = trace(solve(problem, [0.0] * 4), free=["mu"], limits={"mu": (-2, 2)}).labelled("HB")
+    assert point["mu"] == pytest.approx(0, abs=1e-13) and point.details["pairs"] == 2
+
+
 def test_one_pair_comes_as_another_goes():
     """Eigenvalues mu -+ i and .05 - mu -+ 3 i: as many unstable ones before as after."""
     problem = AlgebraicProblem(
