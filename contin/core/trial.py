@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 from contin.core.protocol import Discretization, inner
 from contin.linalg.factors import Factors
 
@@ -222,7 +222,7 @@ class Event:
     unless: str = ""
     column: str = ""
     value: float | None = None
-    normal_form: Callable[..., Array] | None = None
+    normal_form: Callable[..., Numbers] | None = None
     still: float = 0.0
 
     def __post_init__(self) -> None:

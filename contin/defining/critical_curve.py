@@ -149,7 +149,10 @@ def degenerate(label: str, name: str) -> Event:
     def coefficient(trial: Trial) -> Coefficient:
         return cast(CriticalCurve, trial.system).coefficient_at(trial.x)
 
-    return Event(label, name, lambda trial: coefficient(trial).signed, confirm=lambda trial: coefficient(trial).vanishes)
+    def signed(trial: Trial) -> float:
+        return coefficient(trial).signed(trial.newton_error)
+
+    return Event(label, name, signed, confirm=lambda trial: coefficient(trial).vanishes)
 
 
 def signed_smallest(factors: ComplexArray) -> float:

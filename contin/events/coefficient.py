@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 
 #: A coefficient is computed again at a point moved by so much, relative to 1 + |x|: points are located to 1e-14 at best.
 #: Ten times larger, errors are ten times as large.
@@ -47,20 +47,20 @@ class Coefficient:
         return self.estimate()
 
     @classmethod
-    def of(cls, terms: Callable[[Array], Array], x: Array, system: Any) -> Coefficient:
-        """Return the coefficient at a point x from its terms there.
+    def of(cls, terms: Callable[[Array], Numbers], x: Array, system: Any) -> Coefficient:
+        """Return the coefficient at a point x from its terms there: the real part of their sum.
 
         The relative error of the derivatives of ``system`` is part of the error, and so is what an error of x
         changes. At centres of conservative systems the coefficient is zero, and not larger than its error.
         """
         best, of_derivatives = system.with_derivative_error(lambda: terms(x))
-        value, size = float(best.sum()), float(np.abs(best).sum())
+        value, size = float(best.sum().real), float(np.abs(best).sum())
 
         def estimate() -> float:
             random, changes = np.random.default_rng(_SEED), []
             for _ in range(_DRAWS):
                 moved = x + _MOVED * (1 + np.abs(x)) * random.choice((-1.0, 1.0), x.size)
-                changes.append(abs(value - float(terms(moved).sum())))
+                changes.append(abs(value - float(terms(moved).sum().real)))
             return float(_CERTAIN * max(changes) + of_derivatives * size)
 
         return cls(value, size, estimate)
@@ -69,10 +69,13 @@ class Coefficient:
         """Return whether an error is as large as the terms, and not just round-off of terms that are zero."""
         return not (error < self.size or error < _ZERO)
 
-    @property
-    def signed(self) -> float:
-        """The value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations."""
-        return self.value if self.is_certain or not abs(self.value) <= self.error else 0.0
+    def signed(self, known: float) -> float:
+        """Return the value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations.
+
+        ``known`` is the error of the point, relative to 1 + |x|: what Newton's method left may be more than at located ones.
+        """
+        error = self.error * max(1.0, _CERTAIN * known / _MOVED) if not self.is_certain else 0.0
+        return self.value if not abs(self.value) <= error else 0.0
 
     @property
     def is_certain(self) -> bool:

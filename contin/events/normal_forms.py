@@ -183,25 +183,25 @@ class DenseForm(Form):
 
 
 #: Terms of a coefficient.
-Terms = Callable[[Form], Array]
+Terms = Callable[[Form], Numbers]
 
 
-def fold(form: Form) -> Array:
+def fold(form: Form) -> Numbers:
     """Return the terms of b."""
     form = form.reduced
     w, (v, stretch) = form.critical(0.0)
     return _terms(form, 0.0, w, (form.along(v, v), 2 * stretch * form.along_time(v)), 2)
 
 
-def flip(form: Form) -> Array:
+def flip(form: Form) -> Numbers:
     """Return the terms of c."""
     w, (v, _) = form.critical(1j * math.pi)
     h, stretch = form.reduced.solve(0.0, form.along(v, v))
     return _terms(form, 0.0, w, (form.along(v, v, v), 3 * form.along(v, h), 3 * stretch * form.along_time(v)), 6)
 
 
-def pair(form: Form, frequency: float) -> Array:
-    """Return the terms of the real part of d."""
+def pair(form: Form, frequency: float) -> Numbers:
+    """Return the terms of d."""
     rate = 1j * frequency
     w, (v, _) = form.critical(rate)
     h, stretch = form.reduced.solve(0.0, form.along(v, v.conj()).real)
@@ -210,14 +210,14 @@ def pair(form: Form, frequency: float) -> Array:
     return _terms(form, rate, w, (*terms, 2 * stretch * (form.along_time(v) - rate * v)), 2)
 
 
-def _terms(form: Form, rate: complex, w: Numbers, terms: tuple[Any, ...], factor: int) -> Array:
-    return np.array([(form.unit(rate) * form.product(w, term)).real for term in terms]) / factor
+def _terms(form: Form, rate: complex, w: Numbers, terms: tuple[Any, ...], factor: int) -> Numbers:
+    return np.array([form.unit(rate) * form.product(w, term) for term in terms]) / factor
 
 
-def coefficient(system: System, x: Array, terms: Callable[..., Array], *frequency: float) -> Coefficient:
+def coefficient(system: System, x: Array, terms: Callable[..., Numbers], *frequency: float) -> Coefficient:
     """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite."""
 
-    def there(point: Array) -> Array:
+    def there(point: Array) -> Numbers:
         with np.errstate(all="ignore"):
             return terms(here if point is x else system.form(point), *frequency)
 

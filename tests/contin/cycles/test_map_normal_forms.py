@@ -126,3 +126,16 @@ def test_area_preserving_maps_have_no_coefficient_at_doublings():
     branch = contin.trace(contin.solve(problem, [0.0, 0.0]), free=["k"], limits={"k": (3.5, 4.5)})
     for point in branch.labelled("PD"):
         assert abs(point["k"] - 4) < 1e-6 and point.normal_form is None
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("a", [0.3, 0.45, 0.5, 0.55, 0.8, 1.0])
+def test_maps_that_keep_areas_have_no_chenciner_points(a, direction):
+    """Henon's map at b = -1: Re d = 0 all along, though the complex terms of d are of order one."""
+    problem = contin.MapProblem(lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * u.x), ["x", "y"], {"a": a, "b": -0.9})
+    x = (-1.9 + math.sqrt(1.9**2 + 4 * a)) / (2 * a)
+    start = contin.solve(problem, [x, -0.9 * x])
+    (torus,) = contin.trace(start, free=["b"], direction=-1, limits={"b": (-1.5, 0.5)}).labelled("TR")
+    curve = contin.curve(torus, free=["b", "a"], direction=direction, limits={"a": (-2, 5)})
+    assert not curve.labelled("CH") and max(abs(point["b"] + 1) for point in curve) < 1e-11
+    assert {"R2", "R1"} & {point.label for point in curve}
