@@ -272,7 +272,7 @@ class MeshLane(Lane):
 
     def _home(self) -> tuple[Array, Array]:
         home, x, _ = self._start
-        return free_of(home, x, self.system), np.ones(len(self.system.free))
+        return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
     def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
         values, known = self._work.values, self._begun(path, here)

@@ -394,7 +394,8 @@ def returned(start: Start, before: Trial, trial: Trial, step: float) -> Returned
     x = system.lifted(x, trial.x)
     first, (leaving,) = system.in_phase(x, (tangent,), trial.x)
     a, b = (inner(system, end.x - first, leaving) for end in (before, trial))
-    if not a < 0 <= b or inner(system, trial.tangent, leaving) < _SAME_WAY:
+    chord = trial.x - before.x  # at a sharp turn the tangents at both ends say nothing of the one between them
+    if not a < 0 <= b or b - a < _SAME_WAY * np.sqrt(inner(system, chord, chord)):
         return None
     return Returned(step * a / (a - b), x, tangent, first)
 
@@ -410,7 +411,8 @@ def _is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> boo
     rates = [end.tangent[size:].tolist() for end in (before, trial)]
     if any(misses(value, a, t, b, u, step) for value, a, t, b, u in zip(first, ends[0], rates[0], ends[1], rates[1])):
         return True
-    if sum(math.dist(first, end) for end in ends) > REACH * step:
+    lengths = np.sqrt(system.weights[size:])
+    if sum(math.hypot(*(lengths * np.subtract(first, end))) for end in ends) > REACH * step:
         return True  # the free parameters are
     if home.scales is not system.scales:
         return False

@@ -7,7 +7,7 @@ import pytest
 from bank import abc, enz, pp2
 from bank.closed_forms import bratu, bratu_fold, pitchfork
 
-from contin import AlgebraicProblem, Event, Settings, solve, trace
+from contin import AlgebraicProblem, CycleProblem, Event, Settings, solve, trace
 
 
 def labels(branch):
@@ -118,3 +118,20 @@ def test_an_arm_of_a_hyperbola_turns_back(gap, branch_points):
     branch = trace(solve(problem, [3.0]), free=["a"], limits={"a": (-3.1, 3.1)}, branch_points=branch_points, step=2.9)
     assert labels(branch) == ["LP", "EP"] and branch.points[-1]["a"] == pytest.approx(-3.1)
     assert branch.labelled("LP")[0]["a"] == pytest.approx(-gap, rel=1e-8)
+
+
+def test_a_thin_closed_branch_of_cycles():
+    """(q - 1)^2 + 1e4 (a - 1)^2 = 0.04, q the squared radius: the period turns by 3 times a, and weighs 0.006 in the norm."""
+
+    def field(u, p):
+        q = u.x**2 + u.y**2
+        growth, rate = (q - 1) ** 2 + 1e4 * (p.a - 1) ** 2 - 0.04, 1 + p.a**2
+        return growth * u.x - u.y * rate, u.x * rate + growth * u.y
+
+    problem = CycleProblem(field, ["x", "y"], {"a": 1.0})
+    radius = math.sqrt(1.2)
+    start = solve(
+        problem, lambda t: (radius * math.cos(2 * math.pi * t), radius * math.sin(2 * math.pi * t)), {"period": math.pi}
+    )
+    branch = trace(start, free=["a"], limits={"a": (0, 2)}, scales={"a": 1e-3}, max_points=300)
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"] and branch.stop.reason == "closed"
