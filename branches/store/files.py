@@ -136,6 +136,9 @@ def unlock_all() -> None:
         _unlock(path)
 
 
+interrupt.at_last(unlock_all)
+
+
 def prepare(path: Path) -> None:
     """Make the folder of ``path``, check that a result can be written, and remove files of killed runs.
 

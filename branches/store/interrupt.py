@@ -30,6 +30,7 @@ class _State:
     held = 0
     unwinding = 0
     asked = False
+    last: Callable[[], object] = staticmethod(lambda: None)  # what is called before the process ends
 
 
 def begin(kept: str = "") -> None:
@@ -38,6 +39,11 @@ def begin(kept: str = "") -> None:
     change(kept)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, leave)
+
+
+def at_last(function: Callable[[], object]) -> None:
+    """Call a function before Ctrl-C ends the process."""
+    _State.last = staticmethod(function)
 
 
 def change(kept: str) -> None:
@@ -94,9 +100,7 @@ def _act() -> None:
     if _State.unwinding:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         raise KeyboardInterrupt
-    files = sys.modules.get("branches.files")
-    if files is not None and hasattr(files, "unlock_all"):  # it may be half imported
-        files.unlock_all()
+    _State.last()
     _say()
     os._exit(EXIT_INTERRUPTED)
 

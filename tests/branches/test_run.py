@@ -360,7 +360,9 @@ def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
     """While the kernels are being compiled: no traceback, no file."""
     cache = tmp_path_factory.mktemp("cache")
     process = command.start(scene, "--out", "x.h5", env={"CONTIN_CACHE_DIR": cache})
-    time.sleep(1.5)
+    while not (command.folder / ".x.h5.lock").exists() and process.poll() is None:
+        time.sleep(0.01)
+    time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (130, "", "interrupted\n")
