@@ -43,8 +43,8 @@ def main(argv=None) -> int:
 
         sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')}\n")
         return 0
-    if words == ["scenes"]:
-        return _scenes()
+    if words[:1] == ["scenes"]:
+        return _scenes(words[1:])
     if words[:1] == ["completion"]:
         return _complete(words[1:])
     if not words or words[0] not in COMMANDS:
@@ -62,13 +62,17 @@ def main(argv=None) -> int:
     return 0
 
 
-def _scenes() -> int:
-    """List the scenes of the package with their titles."""
+def _scenes(words: list[str]) -> int:
+    """List the scenes of the package with their titles, or what else tells them apart."""
     from branches.scene.parse import read, scenes
-    from branches.store.command import write_output
+    from branches.store import command
 
-    titles = {file.stem: read(file.read_text(encoding="utf-8"), file.name).get("title", "") for file in scenes()}
-    write_output("".join(f"{name:<18} {title}\n" for name, title in titles.items()))
+    command.prefix = "ribbon "
+    command.Parser("scenes", "List the scenes of the package.").parse_args(words)
+    for file in scenes():
+        stated = read(file.read_text(encoding="utf-8"), file.name)
+        told = [f"{name} = {stated[name]}" for name in ("law", "m", "n") if name in stated]
+        command.write_output(f"{file.stem:<18} {stated.get('title') or ', '.join(told)}\n")
     return 0
 
 

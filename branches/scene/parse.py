@@ -35,6 +35,9 @@ def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
         with open(path, "rb") as file:
             data = file.read(_MOST_BYTES + 1)
         text = data.decode("utf-8")
+    except FileNotFoundError as error:
+        of_package = "'ribbon scenes' lists those of the package"
+        raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}; {of_package}") from error
     except OSError as error:
         raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}") from error
     except UnicodeDecodeError as error:

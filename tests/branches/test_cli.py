@@ -88,6 +88,10 @@ def test_help_names_the_command_that_was_typed(command, name):
 
 def test_scenes_of_the_package_are_listed_and_run_by_name(command, root):
     listed = command("scenes", program=PROGRAM).out
+    assert all(len(line.split()) > 1 for line in listed.splitlines())
+    assert command("scenes", "--help", program=PROGRAM).out.startswith("usage: ribbon scenes")
+    assert command("scenes", "x", program=PROGRAM).err == "error: unrecognized arguments: x (--help shows what there is)\n"
+    assert command("run", "m1_n9", program=PROGRAM).err.endswith("; 'ribbon scenes' lists those of the package\n")
     assert [line.split()[0] for line in listed.splitlines()] == sorted(file.stem for file in (root / "configs").glob("*.yaml"))
     done = command("run", "m1_n2", "--quiet", "--set", "steps.max_points=3", program=PROGRAM)
     assert done.returncode == 0 and (command.folder / "m1_n2.h5").exists()
