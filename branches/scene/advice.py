@@ -47,9 +47,9 @@ def no_state(run: Continuation, place: str) -> Stop:
 def _changes(run: Continuation) -> Iterator[tuple[str, State, Settings]]:
     """Yield changed fields of the scene in words, with the state and the settings of a run that has them."""
     state, settings = run.state, run.settings
-    for factor in (_SHORTER, _SHORTER**2):
-        shorter = dataclasses.replace(settings, min_step=settings.min_step / factor)
-        yield f"steps.smallest: {shorter.min_step:g}", state, shorter
+    for smallest in (settings.min_step / _SHORTER, settings.min_step / _SHORTER**2):
+        if smallest > 0:  # the least number there is cannot be divided
+            yield f"steps.smallest: {smallest:g}", state, dataclasses.replace(settings, min_step=smallest)
     if not state.system.intervals:
         return
     system, carry = state.system.refined()

@@ -113,7 +113,7 @@ def shorter_steps(state: State, settings: Settings) -> float | None:
 
 def _least_step(state: State, settings: Settings) -> float | None:
     """Return the largest of some shorter ``min_step`` with which a run goes on; None where it does with none."""
-    shorter = (part * settings.min_step for part in _SHORTER)
+    shorter = (part * settings.min_step for part in _SHORTER if part * settings.min_step > 0)
     way = settings.min_step
     return next((step for step in shorter if _goes_on(state, dataclasses.replace(settings, min_step=step), way)), None)
 

@@ -109,6 +109,14 @@ def test_what_is_accepted_runs(tmp_path_factory, silent, data):
         assert "\n" not in str(error) and not os.listdir(path.parent)
 
 
+def test_the_least_number_as_smallest_step(tmp_path, silent):
+    """Where a run fails, no smaller step can be advised."""
+    mesh = "{degree: 2, intervals: 5, max_intervals: 40, tolerance: 1.0e-14, adapt_every: 3}"
+    steps = "{max_points: 4, largest: 2.888934874210801e+24, smallest: 5.0e-324, angle: 0.8597091859224091}"
+    text = f"{{m: 2, n: 9, nu: 0.0, law: flat rod, domain: cell, mesh: {mesh}, steps: {steps}, stability: true}}"
+    assert run_scene(parse(text, "least"), tmp_path / "x.h5", silent()) in ("complete", "lost")
+
+
 def test_no_field_is_left_out_here():
     assert set(OriginConfig.model_fields) == {"kappa_n", "kappa_star", "mode"} and set(ClosedScene.model_fields) < set(FIELDS)
 
