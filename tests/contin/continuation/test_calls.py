@@ -6,6 +6,7 @@ The time of a step cannot be tested on machines that do other work; the calls ca
 
 import gc
 import math
+import subprocess
 import sys
 
 import numpy as np
@@ -64,9 +65,18 @@ def calls(point, name, step, count):
     return found
 
 
-@pytest.mark.parametrize("kind", [equilibria, henon, bratu, cycles])
+KINDS = {kind.__name__: kind for kind in (equilibria, henon, bratu, cycles)}
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_plain_step_calls_few_python_functions(kind):
-    given = kind()
+    """In a process that finds all kernels compiled: the first one compiles what is missing."""
+    for _ in range(2):
+        done = subprocess.run([sys.executable, __file__, kind], capture_output=True, text=True, check=True)
+    assert float(done.stdout) <= MOST
+
+
+if __name__ == "__main__":
+    given = KINDS[sys.argv[1]]()
     calls(*given, 60)  # functions are recorded, kernels loaded
-    few, many = (min(calls(*given, count) for _ in range(2)) for count in (20, 60))
-    assert (many - few) / 40 <= MOST
+    print((calls(*given, 60) - calls(*given, 20)) / 40)
