@@ -43,11 +43,9 @@ def main(argv=None) -> int:
 
         sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')}\n")
         return 0
-    if words[:1] == ["scenes"]:
-        return _scenes(words[1:])
     if words[:1] == ["completion"]:
         return _complete(words[1:])
-    if not words or words[0] not in COMMANDS:
+    if not words or words[0] not in (*COMMANDS, "scenes"):
         problem = f"there is no command {words[0]!r}" if words else "a command is needed"
         known = ", ".join((*COMMANDS, "scenes"))
         sys.stderr.write(f"error: {problem}; the commands are {known} (--help describes them)\n")
@@ -57,6 +55,8 @@ def main(argv=None) -> int:
     from branches.store import command
 
     command.prefix = "ribbon "
+    if words[0] == "scenes":
+        return _scenes(words[1:])
     sys.argv = [f"ribbon {words[0]}", *words[1:]]
     runpy.run_module(COMMANDS[words[0]][0], run_name="__main__", alter_sys=True)  # as python -m does: ends by SystemExit
     return 0
@@ -67,7 +67,6 @@ def _scenes(words: list[str]) -> int:
     from branches.scene.parse import read, scenes
     from branches.store import command
 
-    command.prefix = "ribbon "
     command.Parser("scenes", "List the scenes of the package.").parse_args(words)
     for file in scenes():
         stated = read(file.read_text(encoding="utf-8"), file.name)

@@ -20,7 +20,7 @@ from branches.scene.parse import difference, dump, parse
 from branches.scene.stages import stages_of
 from branches.scene.sweep import Sweep
 from branches.store.files import ANOTHER_DIAGRAM, StoreError, another_scene, only_run, prepare, write_bytes
-from branches.store.read import branch_in, read_branch
+from branches.store.read import read_branch
 
 #: Combinations without a branch that the summary names; the diagram names all. A sweep over nu has a thousand.
 _MOST_NAMED = 10
@@ -42,7 +42,7 @@ def compute(job: Job) -> tuple[bytes, str, Any]:
     file, text, numbers = job
     found = compute_scene(parse(text, file), Display(silent=True))
     problem = "" if found.status == "complete" else found.stop or found.status
-    return found.image, problem, graph_kind(found.scene).part(branch_in(found.image, file), file, numbers)
+    return found.image, problem, graph_kind(found.scene).part(found.branch(), file, numbers)
 
 
 class _Plan:

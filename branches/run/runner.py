@@ -21,7 +21,9 @@ from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import difference, parse
 from branches.scene.stage import Stage
 from branches.scene.stages import stages_of
+from branches.store.branch import StoredBranch
 from branches.store.files import StoreError, only_run, prepare
+from branches.store.read import computed_branch
 from branches.store.writer import BranchWriter, open_branch, read_kept, read_state
 from contin import Branch, Point, Reason, load, save
 from contin.lowlevel import Continuation, Stop
@@ -67,6 +69,11 @@ class Computed:
     scene: Scene
     points: np.ndarray
     events: np.ndarray
+    notes: list[str]
+
+    def branch(self) -> StoredBranch:
+        """Return the branch without its solutions, as its file gives it."""
+        return computed_branch(self.scene, (self.status, self.stop, self.reason), self.points, self.events, self.notes)
 
     def __repr__(self) -> str:
         return f"Computed({len(self.points)} points, {len(self.events)} of them labelled, {self.status}; {self.stop})"
@@ -80,7 +87,7 @@ def compute_scene(scene: Scene, display: Display) -> Computed:
     outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""
-        return Computed(writer.image(), outcome, str(stop or ""), reason, scene, writer.points(), writer.events())
+        return Computed(writer.image(), outcome, str(stop or ""), reason, scene, writer.points(), writer.events(), writer.notes)
 
 
 def whole_branch(scene: Scene, path: Path, display: Display) -> None:

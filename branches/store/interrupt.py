@@ -30,7 +30,7 @@ class _State:
     held = 0
     unwinding = 0
     asked = False
-    last: Callable[[], object] = staticmethod(lambda: None)  # what is called before the process ends
+    last: list[Callable[[], object]] = []  # what is called before the process ends
 
 
 def begin(kept: str = "") -> None:
@@ -43,7 +43,7 @@ def begin(kept: str = "") -> None:
 
 def at_last(function: Callable[[], object]) -> None:
     """Call a function before Ctrl-C ends the process."""
-    _State.last = staticmethod(function)
+    _State.last.append(function)
 
 
 def change(kept: str) -> None:
@@ -100,7 +100,8 @@ def _act() -> None:
     if _State.unwinding:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         raise KeyboardInterrupt
-    _State.last()
+    for function in _State.last:
+        function()
     _say()
     os._exit(EXIT_INTERRUPTED)
 

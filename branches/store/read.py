@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import parse
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
-from branches.store.layout import CLOSED, OPEN, check, damage_told
+from branches.store.layout import CLOSED, OPEN
 from branches.store.writer import open_branch
 
 
@@ -34,11 +36,12 @@ def read_kind(path: str | Path, kind: str) -> StoredBranch:
     return branch
 
 
-def branch_in(image: bytes, name: str) -> StoredBranch:
-    """Return the branch in the image of a file; errors as of `read_branch` call it ``name``."""
-    with h5py.File.in_memory(image) as file, damage_told(Path(name)):
-        check(file, Path(name))
-        return _branch(file, name)
+def computed_branch(
+    scene: Scene, ended: tuple[str, str, str], points: np.ndarray, events: np.ndarray, notes: Iterable[str]
+) -> StoredBranch:
+    """Return a branch from the tables of its run, without its solutions; ``ended`` is status, stop and reason."""
+    none = np.empty(0)
+    return _class_of(scene)(scene, *ended, points, events, none, none, none, tuple(notes))
 
 
 def _branch(file: h5py.File, name: str) -> StoredBranch:

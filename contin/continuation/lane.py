@@ -282,7 +282,7 @@ class MeshLane(Lane):
         if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
             return 0
         error = path.numbers[1, MESH_ERROR]
-        poor = max(self._poor, _NO_WORSE * error) if error > self._poor else self._poor
+        poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
             now, after = 1 - now, self._factors[1 - now]
             bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0

@@ -50,7 +50,6 @@ class CriticalCurve(Defining):
 
     #: That of the coefficient of the normal form, and others.
     own_columns: tuple[str, ...] = ("normal_form",)
-    _coefficient: tuple[bytes, Coefficient] | None = None
 
     def kappa(self, x: Array) -> float:
         """Return the real number through which the equations contain the complex pair; 0 where there is none."""
@@ -137,10 +136,7 @@ class CriticalCurve(Defining):
 
     def coefficient_at(self, x: Array) -> Coefficient:
         """Return `normal_form`, computed once."""
-        key = x.tobytes()
-        if self._coefficient is None or self._coefficient[0] != key:
-            self._coefficient = key, self.normal_form(x)
-        return self._coefficient[1]
+        return self.once(self.normal_form, x)
 
 
 def degenerate(label: str, name: str) -> Event:

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -37,6 +37,8 @@ from contin.problems.vector_field import found_elsewhere
 #: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
 #: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
 _SHRUNK = 0.1
+
+T = TypeVar("T")
 
 
 class Defining(Discretization):
@@ -87,11 +89,11 @@ class Defining(Discretization):
         self.scales, self.free_scales = base.scales, base.free_scales
         #: What borders the singular matrix: about its null vectors. Made when first needed, renewed where they have turned.
         self.borders: Any = None
-        self._known: tuple[bytes, Any] = b"", None
+        self._known: dict[str, tuple[bytes, Any]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: all but what is computed when it is first asked for."""
-        return {**vars(self), "_known": (b"", None)}
+        return {**vars(self), "_known": {}}
 
     def on(self, base: System) -> Defining:
         """Return the defining system of another underlying one."""
@@ -119,10 +121,15 @@ class Defining(Discretization):
 
     def at(self, x: Array) -> Any:
         """Return what the own equations are made of at x, computed once."""
-        key = x.tobytes()
-        if self._known[0] != key:
-            self._known = key, self.computed(x)
-        return self._known[1]
+        return self.once(self.computed, x)
+
+    def once(self, compute: Callable[[Array], T], x: Array) -> T:
+        """Return what a method computes at x; it is kept for the last x."""
+        key, name = x.tobytes(), compute.__name__
+        if self._known.get(name, (b"", None))[0] != key:
+            self._known[name] = key, compute(x)
+        found: T = self._known[name][1]
+        return found
 
     def inside(self, x: Array) -> Array:
         """Return the unknowns of the underlying system."""

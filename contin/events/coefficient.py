@@ -21,8 +21,8 @@ _DRAWS, _SEED = 2, 5
 #: doubling in a conservative system, changes by less than a tenth of its value once in 20 draws. Ten times larger, errors are
 #: ten times as large.
 _CERTAIN = 10.0
-#: A value above this part of its terms, with terms below this size, is no error: that is not estimated. Where a coefficient
-#: is infinite, its terms are 1e8 and more.
+#: A value above this part of its terms, with terms below this size, is no error: that is not estimated. Near where it is
+#: infinite the terms are large: 2e7 at the doubling of Hénon's map with a Jacobian of -1 + 1e-7.
 _CLEAR, _MODERATE = 1e-3, 1e6
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.

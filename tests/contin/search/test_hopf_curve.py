@@ -1,6 +1,7 @@
 """Curves of Hopf points in two parameters, and points of codimension two on them and on folds, against closed forms."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -36,6 +37,14 @@ def test_of_the_brusselator():
             assert point["b"] == pytest.approx(1 + a * a, abs=1e-10)
             assert point["frequency"] == pytest.approx(a, abs=1e-10)
             assert point["lyapunov"] == pytest.approx(-(2 + a * a) / (2 * a * (1 + 2 * a * a)), abs=1e-8)
+
+
+def test_it_is_pickled():
+    """Points keep their system, and the system what it has computed last: the error of a coefficient is a function."""
+    problem = AlgebraicProblem(brusselator, ["x", "y"], {"a": 1.0, "b": 1.0})
+    found = contin.curve(first_hopf(problem, [1, 1], "b", limits={"b": (0.5, 3)}), free=["b", "a"], max_points=5)
+    again = pickle.loads(pickle.dumps(found))
+    assert [point["lyapunov"] for point in again] == [point["lyapunov"] for point in found]
 
 
 def test_in_odd_units():
