@@ -12,6 +12,7 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.interpolation import uncertainty
+from branches.scene.errors import ROUND_OFF
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.read import read_branch
@@ -34,8 +35,6 @@ _ERRORS = 3.0
 #: Points of a run from a stored solution to a place where Newton's method did not arrive from the interpolant. A run that gets
 #: there takes about as many as lie between stored solutions, the stride of the scene.
 _STEPS = 60
-#: An error is given as no less than this multiple of round-off of 1 + the value.
-_UNITS = 16
 #: States of one question that are solved. One takes 0.03 s of processor time; a sweep over nu may have thousands.
 _MOST = 300
 
@@ -171,7 +170,7 @@ def solved(system: Collocation, x: np.ndarray) -> tuple[dict[str, float], dict[s
     corrected = correct(fine, carry(coarse.x))
     names = system.problem.functionals
     before, after = (dict(zip(names, map(float, s.functionals(c.x)))) for s, c in ((system, coarse), (fine, corrected)))
-    left = corrected.error + _UNITS * np.finfo(float).eps
+    left = corrected.error + ROUND_OFF
     errors = {name: float(abs(after[name] - before[name]) + left * (1 + abs(after[name]))) for name in _COLUMNS}
     return {name: after[name] for name in _COLUMNS}, errors
 

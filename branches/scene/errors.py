@@ -9,8 +9,8 @@ import numpy as np
 from contin import Point
 from contin.lowlevel import error, point_of
 
-#: An error is given as no less than this multiple of round-off of the largest value of its kind.
-_UNITS = 16
+#: An error is given as no less than this part of the largest value of its kind: 16 units in the last place.
+ROUND_OFF = 16 * float(np.finfo(float).eps)
 
 Found = Callable[[Point], Mapping[str, float]]
 
@@ -29,7 +29,7 @@ def errors_of(point: Point, found: Found) -> dict[str, float]:
     largest: dict[str, float] = {}
     for name, value in here.items():
         largest[_kind(name)] = max(largest.get(_kind(name), 0.0), abs(value))
-    left = point.newton_error + _UNITS * float(np.finfo(float).eps)
+    left = point.newton_error + ROUND_OFF
     return {name: float(one + left * largest[_kind(name)]) for name, one in zip(here, errors)}
 
 

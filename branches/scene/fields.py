@@ -181,9 +181,9 @@ class Scene(Strict):
         return fields
 
     @classmethod
+    @abstractmethod
     def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
         """Return a combination in words."""
-        raise NotImplementedError
 
     @classmethod
     def same_name(cls, words: str, a: Scene, b: Scene) -> str:

@@ -5,6 +5,7 @@ On each of N intervals the solution is a polynomial of degree d through d + 1 Lo
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -193,6 +194,6 @@ class OnMesh(System):
         """Those of boundary and integral conditions."""
         return ("boundary", self.problem.boundary_size), ("integrals", self.problem.integral_size)
 
+    @abstractmethod
     def _row_sizes(self, x: Array) -> dict[str, Array]:
         """Return the largest entries of those rows."""
-        raise NotImplementedError
