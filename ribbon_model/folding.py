@@ -66,7 +66,7 @@ def folding(law: Law, m: int, kappa_n: float, parameters: float | Mapping[str, f
     system = Collocation(problem, np.linspace(0, 1, _INTERVALS + 1), _DEGREE, _FREE, values)
     start = HALF_LOOP_BETWEEN_AXES.circle(system, m, kappa_n)
     settings = Settings(primary="M2", limits={"M2": (-_LARGEST, _LARGEST)}, zeros={"M2": [0.0]}, max_points=_MOST, errors=False)
-    points = trace(point_of(system, start), settings).points
+    points = trace(point_of(system, start), settings, progress=False).points
     ends = [i for i, point in enumerate(points) if point.label == "UZ" and i]
     if not ends:
         return None

@@ -69,11 +69,12 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
     A fold is born with amplitude zero, and with M2 = 0: there nu is an even function of M2, extrapolated as a polynomial.
     """
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
-    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
+    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
     fold = branch.labelled("LP")[0]
     moments = [part * fold["M2"] for part in PARTS]
     limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (-200, 200), "M2": (moments[0], 100)}
-    options = {"limits": limits, "zeros": {"nu": NUS, "M2": moments[1:]}}
+    options = {"limits": limits, "zeros": {"nu": NUS, "M2": moments[1:]}, "progress": False}
     up, down = (curve(fold, "nu", direction=sense, **options) for sense in (1, -1))
     points = [*reversed(down.points), *up.points[1:]]
     zeros = [(p["nu"], p["kappa_n"]) for p in points if p.name.startswith("nu = ") and p.label == "UZ"]
@@ -88,11 +89,13 @@ def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, 
     """Where the branch that breaks all but one mirror leaves (m, n): (nu, kappa_n), shape (K, 2); its labelled points."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, events=SymmetryWatch(RIBBON, system, x).monitors)
-    first = next(point for point in trace(point_of(system, x), settings, tangent=tangent) if point.label == LABEL)
+    points = trace(point_of(system, x), settings, tangent=tangent, progress=False)
+    first = next(point for point in points if point.label == LABEL)
     system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)
     start = dataclasses.replace(first, label="BP", system=system, x=found.x, details=found)
-    options = {"limits": {"nu": (LOWEST, HIGHEST), "kappa_n": (LEFT, 100)}, "zeros": {"nu": NUS_SECONDARY}, "max_step": 10.0}
+    limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (LEFT, 100)}
+    options = {"limits": limits, "zeros": {"nu": NUS_SECONDARY}, "max_step": 10.0, "progress": False}
     down, up = (curve(start, "nu", direction=sense, **options) for sense in (-1, 1))
     points = [*reversed(down.points), *up.points[1:]]
     found = [("UZ" if p.name == "start" else p.label, round(p["nu"], 13) + 0.0, p["kappa_n"]) for p in points]

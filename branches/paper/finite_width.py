@@ -84,10 +84,11 @@ def _near_ribbon() -> float:
 def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     """(Gamma, kappa_n) of the fold of (1, 2), shape (K, 2), Gamma ascending; and of the place where it is born."""
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, {"nu": NU, "Gamma": 10.0}, 10, 7)
-    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent=tangent)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
+    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
     fold = branch.labelled("LP")[0]
-    limits = {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}
-    up, down = (curve(fold, "Gamma", direction=sense, limits=limits, zeros={"Gamma": CHECKED[1:]}) for sense in (1, -1))
+    options = {"limits": {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}, "zeros": {"Gamma": CHECKED[1:]}, "progress": False}
+    up, down = (curve(fold, "Gamma", direction=sense, **options) for sense in (1, -1))
     (birth,) = down.labelled("BP")  # the last point
     fold = np.array([(point["Gamma"], point["kappa_n"]) for point in [*reversed(down.points), *up.points[1:]]])
     return fold, (birth["Gamma"], birth["kappa_n"])

@@ -107,7 +107,8 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
 
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
     monitors = SymmetryWatch(law, system, x).monitors if label == "SB" else ()
-    branch = trace(point_of(system, x), Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors), tangent=tangent)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors)
+    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
     point = branch.labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
     kappa_n = _past(point["kappa_n"], side)

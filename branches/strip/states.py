@@ -132,7 +132,7 @@ def at_natural_curvatures(
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 8, 7)
     ends = convexity.test_functions(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
-    for point in trace(point_of(system, x), settings, tangent=tangent):
+    for point in trace(point_of(system, x), settings, tangent=tangent, progress=False):
         if point.label == "LP" and folds is not None:
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))
         if point.label == "UZ":

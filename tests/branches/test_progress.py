@@ -1,10 +1,14 @@
 """The line of progress: on a terminal only, overwritten in place, with an estimate that converges."""
 
+import ast
 import io
 import time
+from pathlib import Path
 
 import pytest
 
+import branches
+import ribbon_model
 from branches.graph.closed import _circle
 from branches.graph.kinds import graph_kind
 from branches.graph.stored import new_graph
@@ -162,6 +166,20 @@ def shown_on_a_terminal(command, *arguments, program, **more):
     """What a command writes on a pseudo-terminal."""
     shown = command.on_terminal(*arguments, program=program, env={"COLUMNS": "200", **more})
     return lines(shown.decode())
+
+
+def test_no_call_of_contin_shows_a_line_of_its_own():
+    """A command has one line of progress, and none if it is quiet: calls within it say so (or pass on what they are given)."""
+    packages = [Path(package.__file__).parent for package in (branches, ribbon_model)]
+    shown = []
+    for path in (path for package in packages for path in package.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "contin"]
+        names = {name.asname or name.name for node in imports for name in node.names} & {"trace", "curve", "diagram"}
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            if getattr(call.func, "id", "") in names and not {key.arg for key in call.keywords} & {"progress", None}:
+                shown.append(f"{path}:{call.lineno}")
+    assert not shown
 
 
 @pytest.mark.full
