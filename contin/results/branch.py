@@ -12,6 +12,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.state import Stop
+from contin.results import curve as curves
 from contin.results import plot, table
 from contin.results.axes import Axes
 from contin.results.point import Point
@@ -130,8 +131,41 @@ class Branch:
         return table.to_pandas(self.points)
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
-        """Draw one column against another, with marks at labelled points.
+    def curve(self, *names: str) -> Array:
+        """Return columns on a smooth curve through the points, to draw, shape (names, many).
+
+        From each point to the next one it is the cubic that has the values and the tangents at both ends. A step with a tangent
+        at one end only is a parabola, one with none a straight line.
+
+        Parameters
+        ----------
+        *names : str
+            As ``x`` and ``y`` of `plot`.
+
+        Raises
+        ------
+        ProblemError
+            A column that the branch does not have, or no points.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> a, x = branch.curve("a", "x")
+        >>> len(a) > 10 * len(branch), bool(abs(a - x**2).max() < 1e-3)
+        (True, True)
+        """
+        for name in names:
+            plot.check_column(self.points, "names", name)
+        return curves.curve(self.points, names)
+
+    @checks.arguments
+    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:
+        """Draw one column against another as a smooth curve, with dots at the points and marks at labelled ones.
+
+        The curve has the tangents of the branch (`curve`). In a window, or a notebook whose pictures are live (``%matplotlib
+        widget``), a click on a point shows its label and its values.
 
         Of cycles and equilibria, and where the index is known (`VariationalProblem`), stable parts are solid and unstable ones
         dashed. The solutions of an `AlgebraicProblem` count as equilibria unless it is stated with ``dynamics=False``.
@@ -145,6 +179,8 @@ class Branch:
             first state.
         axes : matplotlib.axes.Axes, optional
             Where to draw; a figure of its own without.
+        errors : bool
+            Draw the estimated errors of both columns as bars. Most are shorter than a dot.
 
         Returns
         -------
@@ -165,7 +201,7 @@ class Branch:
         >>> branch.plot("a", "x").get_ylabel()
         'x'
         """
-        return plot.plot(self.points, x, y, axes)
+        return plot.plot(self.points, x, y, axes, errors)
 
     def _repr_html_(self) -> str:
         return table.to_html(self.points, self.stop, self.notes)

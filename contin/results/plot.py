@@ -10,31 +10,62 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array
 from contin.core.labels import Label
 from contin.errors import ProblemError
 from contin.results.axes import Axes, new_axes
+from contin.results.colours import Colour
+from contin.results.curve import PARTS, column, curve
 from contin.results.point import Point
 
-#: Marks of labelled points: matplotlib's symbol and colour (Okabe-Ito: told apart by the colour-blind).
+#: Labelled points: matplotlib's symbol, colour, and the words of the legend.
 _MARKS = {
-    "LP": ("*", "#D55E00"), "BP": ("o", "#000000"), "HB": ("s", "#009E73"), "UZ": ("D", "#CC79A7"), "CP": ("^", "#D55E00"),
-    "PD": ("X", "#0072B2"), "TR": ("h", "#56B4E9"), "BT": ("v", "#000000"), "ZH": ("<", "#E69F00"), "HH": (">", "#56B4E9"),
-    "GH": ("P", "#009E73"), "GPD": ("P", "#0072B2"), "CH": ("P", "#56B4E9"), "LPPD": ("d", "#D55E00"), "LPTR": ("d", "#56B4E9"),
-    "EX": ("s", "#D55E00"), "R1": ("p", "#E69F00"), "R2": ("p", "#CC79A7"), "R3": ("p", "#0072B2"), "R4": ("p", "#009E73"),
-}  # fmt: skip
-_OTHER_MARK = (".", "#000000")
+    "EP": (".", Colour.BLACK, "end"),
+    "LP": ("*", Colour.VERMILION, "fold"),
+    "BP": ("o", Colour.BLACK, "branch point"),
+    "HB": ("s", Colour.GREEN, "Hopf point"),
+    "UZ": ("D", Colour.PURPLE, "given value"),
+    "EX": ("s", Colour.VERMILION, "extremum"),
+    "PD": ("X", Colour.BLUE, "period doubling"),
+    "TR": ("h", Colour.SKY, "torus bifurcation"),
+    "MX": ("x", Colour.BLACK, "Newton's method failed"),
+    "CP": ("^", Colour.VERMILION, "cusp"),
+    "BT": ("v", Colour.BLACK, "Bogdanov-Takens point"),
+    "ZH": ("<", Colour.ORANGE, "zero-Hopf point"),
+    "HH": (">", Colour.SKY, "double Hopf point"),
+    "GH": ("P", Colour.GREEN, "generalized Hopf point"),
+    "GPD": ("P", Colour.BLUE, "generalized period doubling"),
+    "CH": ("P", Colour.SKY, "Chenciner point"),
+    "LPPD": ("d", Colour.VERMILION, "fold-flip point"),
+    "LPTR": ("d", Colour.SKY, "fold-torus point"),
+    "R1": ("p", Colour.ORANGE, "resonance 1:1"),
+    "R2": ("p", Colour.PURPLE, "resonance 1:2"),
+    "R3": ("p", Colour.BLUE, "resonance 1:3"),
+    "R4": ("p", Colour.GREEN, "resonance 1:4"),
+}
+_OTHER_MARK = (".", Colour.BLACK, "")
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
 _CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)
 #: Dashes and legend of pieces, by whether they are stable; None: not known.
 _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
+#: Words of axes for columns that every branch has.
+_WORDS = {
+    "norm": "norm (root mean square of the states)", "arclength": "arclength of the branch",
+    "discretization_error": "discretization error, relative to 1 + size",
+}  # fmt: skip
 #: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.
 _VISIBLE = 1e-3
-#: Areas of the marks in points squared: a star needs a larger one to look as large.
+#: Areas of the marks in points squared: a star needs a larger one to look as large. Points without a label are dots.
 _AREA = {"*": 90, "": 30}
+_DOT = 5
+#: A click within this distance of a point, in points of the screen, is on it: as near as a hand aims.
+_NEAR = 5
+#: Columns that a click shows at most: the box stays small.
+_MOST_COLUMNS = 8
 
 
-def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
+def plot(
+    points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False
+) -> Any:
     """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
@@ -42,7 +73,9 @@ def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, ax
     named: set[str | None] = set(axes.get_legend_handles_labels()[1])
     for column_name in columns:
         named |= _draw(points, (x, column_name), pieces, named, axes)
-    axes.set(xlabel=x, ylabel=name)
+        if errors:
+            _bars(points, (x, column_name), axes)
+    axes.set(xlabel=_WORDS.get(x, x), ylabel=_WORDS.get(name, name))
     if any(point.label for point in points) or named - {None}:
         axes.legend(frameon=False)
     return axes
@@ -53,27 +86,84 @@ def _draw(
     axes: Axes,
 ) -> set[str | None]:  # fmt: skip
     """Draw one column over another, and return the names for the legend; those that are ``known`` are not given again."""
-    across, up = column(points, names[0]), column(points, names[1])
+    (across, up), (x, y) = (column(points, name) for name in names), curve(points, names)
     named: set[str | None] = set()
+
+    def once(word: str | None) -> str | None:
+        label = None if word in known | named else word
+        named.add(word)
+        return label
+
     for stable, piece in pieces:
-        dashes, name = _LINES[stable]
-        label = None if name in known | named else name
-        named.add(name)
-        axes.plot(across[piece], up[piece], lw=1.5, color="#0072B2", ls=dashes, label=label, zorder=1)
+        dashes, word = _LINES[stable]
+        fine = slice(piece.start * PARTS, (piece.stop - 1) * PARTS + 1)
+        axes.plot(x[fine], y[fine], lw=1.5, color=Colour.BLUE, ls=dashes, label=once(word), zorder=1)
+    _tell(axes, axes.scatter(across, up, s=_DOT, color=Colour.BLUE, picker=True, pickradius=_NEAR, zorder=1.5), points)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]
-        marker, colour = _MARKS.get(label, _OTHER_MARK)
-        area, again = _AREA.get(marker, _AREA[""]), label in known
-        axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=None if again else label, zorder=2)
-        named.add(label)
+        marker, colour, word = _MARKS.get(label, _OTHER_MARK)
+        area = _AREA.get(marker, _AREA[""])
+        word = f"{word} ({label})" if word else label
+        axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=once(word), zorder=2)
     doubtful = [i for i, point in enumerate(points) if point.discretization_error > _VISIBLE]
     if doubtful:
         meaning = f"discretization error above {_VISIBLE:g}"
-        shown = None if meaning in known else meaning
-        axes.scatter(across[doubtful], up[doubtful], s=30, marker="x", color="#999999", label=shown, zorder=3)
-        named.add(meaning)
+        axes.scatter(across[doubtful], up[doubtful], s=30, marker="x", color=Colour.GREY, label=once(meaning), zorder=3)
     return named
+
+
+def _bars(points: Sequence[Point], names: tuple[str, str], axes: Axes) -> None:
+    """Draw the estimated errors of both columns as bars; see `error_bar`."""
+    (across, up), bars = (column(points, name) for name in names), [[error_bar(p, name) for p in points] for name in names]
+    axes.errorbar(across, up, xerr=bars[0], yerr=bars[1], fmt="none", ecolor=Colour.GREY, capsize=2, zorder=1.2)
+
+
+def error_bar(point: Point, name: str) -> float:
+    """Return the estimated error of a column: that of a labelled point, elsewhere the error of the whole solution.
+
+    The latter is the sum of the errors of the mesh and of Newton's method, relative to 1 + size, for the size of the column.
+    NaN where it is not known, or the column is none of the solution.
+    """
+    if name in point.errors:
+        return point.errors[name]
+    if name in ("arclength", "discretization_error"):
+        return np.nan
+    return (point.discretization_error + point.newton_error) * (1 + abs(float(column([point], name)[0])))
+
+
+def _tell(axes: Axes, dots: Any, points: Sequence[Point]) -> None:
+    """Show the label and the values of a point when it is clicked on, in a window or a notebook with a live picture."""
+    box = axes.annotate(
+        "", (0, 0), (12, 12), textcoords="offset points", fontsize="small", visible=False, zorder=5,
+        bbox={"boxstyle": "round", "fc": "white", "ec": Colour.GREY}, arrowprops={"arrowstyle": "-", "color": Colour.GREY},
+    )  # fmt: skip
+
+    def show(event: Any) -> None:
+        box.set_visible(event.artist is dots)
+        if event.artist is dots:
+            places = dots.get_offsets()
+            away = axes.transData.transform(places[event.ind]) - (event.mouseevent.x, event.mouseevent.y)
+            near = sorted(zip(np.hypot(*away.T).tolist(), event.ind.tolist()))
+            number = min(near, key=lambda pair: not points[pair[1]].label)[1]  # of several the nearest, a labelled one first
+            box.xy = tuple(places[number])
+            box.set_text(said(points[number], number))
+        axes.figure.canvas.draw_idle()
+
+    axes.figure.canvas.mpl_connect("pick_event", show)
+
+
+def said(point: Point, number: int) -> str:
+    """Return the label and the columns of a point, with the errors that are known, a line each."""
+    word = _MARKS.get(point.label, _OTHER_MARK)[2]
+    head = " ".join(filter(None, (point.label, f"({word})" if word else "", point.name)))
+    lines = [f"point {number}{': ' * bool(head)}{head}"]
+    columns = {**point.parameters, **point.functionals}
+    for name, value in list(columns.items())[:_MOST_COLUMNS]:
+        error = point.errors.get(name, np.nan)
+        lines.append(f"{name} = {value:.10g}" + (f" ± {error:.0e}" if np.isfinite(error) else ""))
+    lines += ["..."] * (len(columns) > _MOST_COLUMNS)
+    return "\n".join(lines + [f"index {point.index}"] * (point.index is not None))
 
 
 def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
@@ -88,7 +178,7 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     """
     moving = bool(points) and points[0].system.unstable(points[0].x) is not None
     if len(points) < 2 or (not moving and all(point.index is None for point in points)):
-        yield None, slice(None)
+        yield None, slice(0, len(points))
         return
     first = 0
     for stable, steps in groupby(_of_motions(points) if moving else map(_stable, *zip(*pairwise(points)))):
@@ -134,30 +224,32 @@ def picture(points: Sequence[Point]) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
-def column(points: Sequence[Point], name: str) -> Array:
-    """Return a parameter, functional, state of equilibria, ``"arclength"``, ``"norm"`` or ``"discretization_error"``.
-
-    The norm is the root mean square of the states over the nodes.
-    """
-    if points and name in (*points[0].parameters, *points[0].functionals, *points[0].system.named_states):
-        return np.array([point[name] for point in points])
-    if name in ("arclength", "discretization_error"):
-        return np.array([getattr(point, name) for point in points])
-    return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
-
-
 def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, list[str], str]:
     """Return the names of the columns to draw and of the second axis, with the defaults of `plot`."""
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *first.system.named_states]
     x = first.system.free[0] if x is None else x
     states = first.system.problem.states if first.system.is_cycle and first.system.intervals else ()
     y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y
-    if x in known and y in states:
+    check_column(points, "x", x, states)
+    if y in states:
         return x, [f"max_{y}", f"min_{y}"], f"{y}, largest and smallest"
-    for argument, name in (("x", x), ("y", y)):
-        if name not in known:
-            raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join((*known, *states))}")
+    check_column(points, "y", y, states)
     return x, [y], y
+
+
+def check_column(points: Sequence[Point], argument: str, name: str, further: Sequence[str] = ()) -> None:
+    """Check that a name is that of a column; ``further`` are listed with the columns where it is not.
+
+    Raises
+    ------
+    ProblemError
+        There are no points, or there is no such column.
+    """
+    if not points:
+        raise ProblemError("the branch has no points to draw")
+    first = points[0]
+    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *first.system.named_states]
+    if name not in known:
+        raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join((*known, *further))}")

@@ -15,6 +15,7 @@ from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
 from contin.problems.statement import declared
 from contin.results.axes import Axes, new_axes
+from contin.results.colours import PALETTE
 from contin.results.profile import Profile
 from contin.results.record import Record, over_t
 
@@ -22,10 +23,8 @@ from contin.results.record import Record, over_t
 _PER_INTERVAL = 8
 #: Fewest places at which a solution is drawn: the width of a small picture in points.
 _FEWEST = 400
-#: Colours of states (Okabe-Ito: told apart by the colour-blind), in order; more states begin anew.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 #: States in a picture over time: more cannot be told apart.
-_MOST_STATES = len(_COLOURS)
+_MOST_STATES = len(PALETTE)
 #: Powers of ten of the circles that are drawn beyond the unit circle, at most.
 _MOST_RINGS = 6
 #: What is said of a point of which there are no such pictures.
@@ -128,7 +127,7 @@ def _portrait(point: Record, names: tuple[str, ...], axes: Axes) -> None:
     courses = _courses(point, names[:2])
     for index, (_, states) in enumerate(courses):
         x, y = states.T
-        colour = _COLOURS[index % len(_COLOURS)]
+        colour = PALETTE[index % len(PALETTE)]
         axes.plot(x, y, lw=1.5, color=colour, label=f"segment {index}")
         at = len(x) // 8
         at -= 2 * bool(np.isnan(x[at : at + 2] + y[at : at + 2]).any())  # beside the gap of an angle
@@ -147,7 +146,7 @@ def _series(point: Record, names: tuple[str, ...], axes: Axes) -> None:
     names = names[:_MOST_STATES]
     courses = _courses(point, names)
     for index, (t, states) in enumerate(courses):
-        for name, column, colour in zip(names, states.T, _COLOURS):
+        for name, column, colour in zip(names, states.T, PALETTE):
             axes.plot(t, column, lw=1.5, color=colour, label=name if index == 0 else None)
         if index:
             axes.axvline(t[0], lw=0.6, ls=":", color="#666666", zorder=1)
@@ -176,7 +175,7 @@ def _multipliers(point: Record, names: tuple[str, ...], axes: Axes) -> None:
         if ring:
             axes.annotate(f"$10^{ring}$", (0, 1 + ring), ha="center", va="center", fontsize=8, color="#666666",
                           bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
-    for which, colour, name in ((~outside, _COLOURS[0], "not outside"), (outside, _COLOURS[1], "outside")):
+    for which, colour, name in ((~outside, PALETTE[0], "not outside"), (outside, PALETTE[1], "outside")):
         if np.any(which):
             here = places[which]
             axes.scatter(here.real, here.imag, s=40, color=colour, zorder=2, label=f"{len(here)} {name}")

@@ -6,7 +6,8 @@ import html
 from collections.abc import Sequence
 from typing import Any
 
-from contin.results.plot import column, picture
+from contin.results.curve import column
+from contin.results.plot import picture
 from contin.results.point import Point
 
 #: Labelled points that the table of a notebook lists: about a screen. The others are counted.

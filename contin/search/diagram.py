@@ -79,7 +79,7 @@ class Diagram:
         return "\n".join([head, *lines])
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None) -> Any:
+    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:
         """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
 
         Parameters
@@ -88,6 +88,8 @@ class Diagram:
             As in `contin.Branch.plot`. Where cycles are among the branches, ``y`` is a state, the first one by default.
         axes : matplotlib.axes.Axes, optional
             Where to draw; a figure of its own without.
+        errors : bool
+            As in `contin.Branch.plot`.
 
         Returns
         -------
@@ -106,7 +108,7 @@ class Diagram:
         if cycles and y is None:
             y = cycles[0].problem.states[0]
         for points in drawn:
-            axes = plot.plot(points, x, y, axes)
+            axes = plot.plot(points, x, y, axes, errors)
         return axes
 
     def graph(self) -> Any:

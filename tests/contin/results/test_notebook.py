@@ -1,5 +1,6 @@
 """Tables, plots and HTML of a branch in a notebook. The branch is that of Bratu's problem."""
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -7,7 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu, bratu_fold, parabola
+from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_mean, parabola
+from scipy.optimize import brentq
 
 import contin
 
@@ -52,7 +54,6 @@ def test_stable_parts_are_solid_and_unstable_ones_dashed():
     assert solid.get_linestyle() == "-" and dashed.get_linestyle() == "--"
     (fold,) = branch.labelled("LP")
     assert solid.get_xdata()[-1] == dashed.get_xdata()[0] == fold["gap"]
-    assert len(solid.get_xdata()) + len(dashed.get_xdata()) == len(branch) + 1
 
 
 def test_plot(branch):
@@ -60,10 +61,84 @@ def test_plot(branch):
 
     axes = branch.plot(axes=Figure().subplots())
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("lam", "mean")
-    assert np.array_equal(axes.lines[0].get_xdata(), branch.column("lam"))
-    assert {text.get_text() for text in axes.get_legend().get_texts()} == {"EP", "UZ", "LP"}
+    dots = axes.collections[0].get_offsets()
+    assert np.array_equal(dots, np.column_stack([branch.column("lam"), branch.column("mean")]))
+    words = {text.get_text() for text in axes.get_legend().get_texts()}
+    assert words == {"end (EP)", "given value (UZ)", "fold (LP)"}
     axes = branch.plot("arclength", "norm", axes=Figure().subplots())
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength", "norm")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength of the branch", "norm (root mean square of the states)")
+
+
+def test_curves_have_the_tangents_of_the_branch(branch):
+    """Of the closed form (`bratu_load`, `bratu_mean`) they are off by far less than straight lines between the points."""
+    load, mean = branch.curve("lam", "mean")
+    assert set(branch.column("lam")) <= set(load)
+
+    def off(load, mean):
+        s = np.array([brentq(lambda s, m=m: bratu_mean(s) - m, 0, 8) for m in mean])
+        return max(abs(a - bratu_load(b)) for a, b in zip(load, s))
+
+    parts = (len(load) - 1) // (len(branch) - 1)
+    middles = slice(parts // 2, None, parts)
+    straight = off(*(branch.column(name)[:-1] / 2 + branch.column(name)[1:] / 2 for name in ("lam", "mean")))
+    assert off(load[middles], mean[middles]) < straight / 20 and straight > 0.01
+
+
+def test_curves_where_tangents_are_missing(branch):
+    """A step with one tangent is a parabola, one with none a straight line: neither overshoots."""
+    point = branch.points[4]
+    nowhere = [dataclasses.replace(point, tangent=np.full_like(point.tangent, np.nan)) for point in branch.points]
+    straight = contin.Branch(nowhere).curve("lam", "mean")
+    middle = (branch.column("lam")[4] + branch.column("lam")[5]) / 2
+    assert np.isclose(straight[0], middle, rtol=1e-12).any()
+    one = contin.Branch([point, nowhere[5]]).curve("lam", "mean")
+    bend = np.diff(one, n=3, axis=1)
+    assert np.abs(bend).max() < 1e-12 < np.abs(np.diff(one, n=2, axis=1)).max()
+
+
+def test_the_branch_of_a_pitchfork_bends_into_its_branch_point():
+    """x = +-sqrt(a): the cubic in the arclength is off by less than a hundredth of the first step's height."""
+    pitchfork = contin.AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    found = contin.diagram(contin.solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+    bent = [branch.curve("a", "x") for branch in found.branches if branch.points[-1]["x"] != 0]
+    assert len(bent) == 2
+    for a, x in bent:
+        assert np.abs(a - x**2).max() < 1e-3
+
+
+def test_errors_are_drawn_where_they_are_asked_for():
+    from matplotlib.figure import Figure
+
+    coarse = contin.solve(bratu(), [0, 0], intervals=2, degree=2)
+    control = contin.MeshControl(0.9, 2, 2, 0)
+    branch = contin.trace(coarse, free=["lam"], limits={"mean": (-1, 2)}, mesh=control, progress=False)
+    plain, barred = (branch.plot(axes=Figure().subplots(), errors=errors) for errors in (False, True))
+    assert not plain.containers and len(barred.containers) == 1
+    across = barred.containers[0][2][0].get_segments()
+    point = branch.points[-1]
+    here = (point.discretization_error + point.newton_error) * (1 + point["lam"])
+    assert np.ptp(across[-1][:, 0]) == pytest.approx(2 * point.errors.get("lam", here))
+
+
+def test_a_click_on_a_point_shows_its_label_and_its_values(branch):
+    from matplotlib.backend_bases import MouseEvent
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    canvas = FigureCanvasAgg(figure)
+    axes = branch.plot(axes=figure.subplots())
+    canvas.draw()
+    (box,) = [text for text in axes.texts if text.get_bbox_patch()]
+    assert not box.get_visible()
+    fold = branch.labelled("LP")[0]
+    at = axes.transData.transform((fold["lam"], fold["mean"]))
+    canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", canvas, *at, 1))
+    assert box.get_visible()
+    lines = box.get_text().splitlines()
+    assert lines[0].startswith("point ") and lines[0].endswith(": LP (fold) lam")
+    assert lines[1].startswith("lam = 3.51383071") and "±" in lines[1]
+    assert lines[2] == f"mean = {fold['mean']:.10g}"
 
 
 def test_columns_that_are_not_there(branch):
@@ -85,7 +160,7 @@ def test_html_is_well_formed_and_lists_labelled_points(branch):
 
 def test_a_problem_without_functionals_is_drawn_against_its_norm():
     axes = contin.trace(contin.solve(parabola(), [1.0]), free=["mu"], limits={"mu": (0.5, 2)}).plot()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", "norm")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", "norm (root mean square of the states)")
 
 
 def test_contin_alone_imports_neither_library():
