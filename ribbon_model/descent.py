@@ -35,6 +35,13 @@ from ribbon_model.stability import Stability, index
 
 #: Radius of gyration of a section in the metric 'velocity', in units of L / 2 pi.
 GYRATION = 0.05
+#: Distance past its limit at which a state is let go, relative to 1 + |limit|. Segments shift limits by O(N^-2): at a tenth of
+#: the distance a strip may stay where it is.
+PAST = 0.01
+#: Root mean square in the strains of the kick that it is given. A tenth only takes longer.
+KICK = 0.02
+#: Segments of such a strip. Twice as many take four times as long.
+SEGMENTS = 96
 
 _FASTEST = 1e8  # largest time step: Newton's method
 _ROUND_OFF = 1e-14  # of the energy
@@ -82,6 +89,13 @@ class Descent:
     def slack(self) -> int:
         """The most segments at any time on which the energy was not strictly convex."""
         return max(strip.slack for strip in self.strips)
+
+    def frames(self, count: int) -> list[Strip]:
+        """Return states at equal distances in the strains along the way, the first and the last among them."""
+        strains = np.array([strip.strains for strip in self.strips])
+        steps = np.sqrt(np.mean(np.sum(np.diff(strains, axis=0) ** 2, axis=2), axis=1))
+        way = np.concatenate([[0], np.cumsum(steps)])
+        return [self.strips[int(np.argmin(np.abs(way - place)))] for place in np.linspace(0, way[-1], count)]
 
 
 def _strain_metric(strip: Strip) -> np.ndarray:
@@ -300,6 +314,30 @@ def identify(strip: Strip) -> Rest:
         if difference < _SAME:
             return Rest("primary branch", m, n, *map(float, values[1]), error, difference, stability)
     return Rest("unknown", 0, n, *map(float, values[1]), error, math.nan, stability)
+
+
+def past(limit: float, side: int) -> float:
+    """Return kappa_n a little past a limit of stability, on the side +1 or -1, where `let_go` lets the strip go."""
+    return limit + side * PAST * (1 + abs(limit))
+
+
+def let_go(strip: Strip, metric: str = "strain", sign: int = 1) -> tuple[Descent, Rest]:
+    """Return the way down of a strip that is let go past its limit, and its end: a minimum of the energy.
+
+    The strip is perturbed along its lowest mode, with one ``sign`` or the other. See `descend` for ``metric``.
+
+    Raises
+    ------
+    ArithmeticError
+        The strip does not come to rest at a minimum of the energy of the continuous strip.
+    """
+    descent = descend(perturbed(strip, sign * KICK), metric)
+    rest = identify(descent.end)
+    if not (descent.rests and rest.stability.decided and rest.stability.index == 0):
+        raise ArithmeticError(
+            f"let go at kappa_n = {strip.kappa_n:g}: no minimum, gradient {descent.gradient:.1e}, index {rest.stability.index}"
+        )
+    return descent, rest
 
 
 def polished(strip: Strip, intervals: int = 24, degree: int = 7):

@@ -171,6 +171,7 @@ class Branch {
     if (this.circle) return placed(planar(this.m), [1, 0, 0]);
     const part = stations(this.states(s), this.shapes.nodes);
     if (this.domain === "open") return open(part);
+    if (this.domain === "loop") return flattened(part.slice(0, -1));
     if (!this.ruled) part.forEach((station) => (station.eta = 0));
     if (this.domain === "half loop") return placed(mirrored(part).slice(0, -1));
     if (this.domain !== "cell") return placed(turned(part).slice(0, -1));

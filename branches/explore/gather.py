@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 from branches.explore import open_strips, profiles, strips
@@ -18,6 +19,8 @@ from branches.store.read import read_branch
 STORED = ".npz"
 #: Files that are read without starting processes, which takes as long as reading so many.
 _ALONE = 8
+#: Folds are let go in pages of at most so many files: four ways down take two seconds.
+_LET_GO = 100
 #: Largest size of the texts of columns and shapes on a page. With the library that draws (4.9 MB) and names it makes 30 MB.
 _MOST_BYTES = 22_500_000
 
@@ -80,14 +83,15 @@ def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -
 def _read(files: list[Path], progress: Progress) -> list[dict]:
     """Return what the page holds of the files, in their order; many files are read by several processes."""
     found: dict[Path, dict] = {}
+    read = partial(strips.branch_of, let_go=len(files) <= _LET_GO)
     few = files[:1] if len(files) > _ALONE else files  # the first one loads compiled code, before processes are forked
     for path in few:
-        found[path] = strips.branch_of(path)
+        found[path] = read(path)
         progress.part_done()
     if len(few) < len(files):
         rest = iter(files[1:])
         with executor() as (submit, wait, count):
-            for path, branch in run_jobs(lambda running: next(rest, None), strips.branch_of, submit, count, wait):
+            for path, branch in run_jobs(lambda running: next(rest, None), read, submit, count, wait):
                 if isinstance(branch, BaseException):
                     raise branch
                 found[path] = branch

@@ -210,4 +210,4 @@ async function start() {
 }
 
 /** For tests, and for whoever opens the console: the state, and how long the first picture took in milliseconds. */
-window.explore = { now, go, coexisting, csv, exactCurve, snapTarget, families: FAMILIES, ready: start() };
+window.explore = { now, go, coexisting, csv, exactCurve, descent, wayHere, restOf, families: FAMILIES, ready: start() };

@@ -104,10 +104,8 @@ function open(part) {
   const ends = [0, 1, 2].map((i) => part.map(({ x }) => x[i])),
     middle = ends.map((values) => (Math.min(...values) + Math.max(...values)) / 2),
     turn = (a) => [a[2], a[0], a[1]],
-    loop = part.concat([...part].reverse()),
-    flat = new Float64Array(loop.length * STATION);
-  loop.forEach(({ x, d, eta }, k) => flat.set([...turn(along(x, -1, middle)), ...d.flatMap(turn), eta], k * STATION));
-  return flat;
+    turned = part.map(({ x, d, eta }) => ({ x: turn(along(x, -1, middle)), d: d.map(turn), eta }));
+  return flattened(turned.concat([...turned].reverse()));
 }
 
 /** Stations as one flat array, the middle at the origin, `axis` (else the normal of the enclosed area) along z, d3(0) along y. */
@@ -117,9 +115,12 @@ function placed(loop, axis) {
   const up = axis || unit(area),
     side = unit(along([0, 0, 1], -up[2], up)),
     frame = [cross(side, up), side, up];
+  return flattened(loop.map(({ x, d, eta }) => ({ x: apply(frame, along(x, -1, middle)), d: d.map((a) => apply(frame, a)), eta })));
+}
+
+/** Stations as one flat array. */
+function flattened(loop) {
   const flat = new Float64Array(loop.length * STATION);
-  loop.forEach(({ x, d, eta }, k) => {
-    flat.set([...apply(frame, along(x, -1, middle)), ...d.flatMap((a) => apply(frame, a)), eta], k * STATION);
-  });
+  loop.forEach(({ x, d, eta }, k) => flat.set([...x, ...d.flat(), eta], k * STATION));
   return flat;
 }

@@ -1,8 +1,8 @@
 "use strict";
-// From a fold to another state of the same natural curvature: a picture between two shapes, not the dynamics.
+// The way down from a fold, along the energy, that `ribbon_model.descent` computed when the page was written.
 
-const MORPH_TIME = 2600, // milliseconds
-  MORPH_STATIONS = 384,
+const DESCENT_TIME = 5000, // milliseconds
+  LAID_STATIONS = 384,
   SHIFTS = 96; // of the second shape along the strip, that are tried to lay it over the first
 
 /** The unit quaternion of directors d1, d2, d3 (columns of a rotation). */
@@ -35,114 +35,91 @@ function between(p, q, t) {
   return mixed.map((part) => part / size);
 }
 
-/** A strip as {frames, eta} at equidistant stations; the sign of the quaternions is continuous along it. */
+/** The frames of a strip at equidistant stations; the sign of the quaternions is continuous along it. */
 function frames(strip) {
   const n = count(strip),
-    result = { frames: [], eta: [] };
-  for (let k = 0; k < MORPH_STATIONS; k++) {
-    const at = Math.round((k * n) / MORPH_STATIONS) % n,
+    result = [];
+  for (let k = 0; k < LAID_STATIONS; k++) {
+    const at = Math.round((k * n) / LAID_STATIONS) % n,
       row = strip.subarray(at * STATION, (at + 1) * STATION);
     const q = quaternion([row.subarray(3, 6), row.subarray(6, 9), row.subarray(9, 12)]),
-      last = result.frames[k - 1];
-    result.frames.push(last && dot4(last, q) < 0 ? q.map((part) => -part) : q);
-    result.eta.push(row[12]);
+      last = result[k - 1];
+    result.push(last && dot4(last, q) < 0 ? q.map((part) => -part) : q);
   }
   return result;
 }
 
-/** The shift and rotation that lay the frames `from` over `to` best: {shift, turn, fit}, fit 1 where they agree. */
+/** The rotation that lays the frames `from` over `to` best, at the best shift along the strip. */
 function aligned(from, to) {
   let best = { fit: -1 };
   for (let trial = 0; trial < SHIFTS; trial++) {
-    const shift = (trial * MORPH_STATIONS) / SHIFTS;
+    const shift = (trial * LAID_STATIONS) / SHIFTS;
     // the mean of to * conjugate(from) is the rotation that fits best; the sign jumps where the station numbers wrap round
-    const wrap = Math.sign(dot4(to[0], to[MORPH_STATIONS - 1])),
+    const wrap = Math.sign(dot4(to[0], to[LAID_STATIONS - 1])),
       sum = [0, 0, 0, 0];
-    for (let k = 0; k < MORPH_STATIONS; k += 4) {
-      const sign = k + shift < MORPH_STATIONS ? 1 : wrap,
-        relative = product(to[(k + shift) % MORPH_STATIONS], conjugate(from[k]));
+    for (let k = 0; k < LAID_STATIONS; k += 4) {
+      const sign = k + shift < LAID_STATIONS ? 1 : wrap,
+        relative = product(to[(k + shift) % LAID_STATIONS], conjugate(from[k]));
       relative.forEach((part, i) => (sum[i] += sign * part));
     }
-    const size = Math.hypot(...sum),
-      fit = (4 * size) / MORPH_STATIONS;
-    if (fit > best.fit) best = { fit, shift, wrap, turn: sum.map((part) => part / size) };
+    const fit = Math.hypot(...sum);
+    if (fit > best.fit) best = { fit, turn: sum.map((part) => part / fit) };
   }
-  return best;
+  return best.turn;
 }
 
-/** The strip between two strips as a function of t, 0 ... 1: frames are interpolated and integrated, and the gap is closed. */
-function morph(first, second) {
-  const [from, to] = [frames(first), frames(second)],
-    { shift, turn, wrap, fit } = aligned(from.frames, to.frames);
-  const target = from.frames.map((_, k) => {
-    const sign = k + shift < MORPH_STATIONS ? 1 : wrap;
-    return to.frames[(k + shift) % MORPH_STATIONS].map((part) => sign * part);
-  });
-  const identity = turn[0] < 0 ? [-1, 0, 0, 0] : [1, 0, 0, 0];
-  const at = (t) => {
-    const back = between(conjugate(turn), identity, t); // at 0 as the first strip stands, at 1 as the second
-    const mixed = from.frames.map((q, k) => product(back, between(product(turn, q), target[k], t)));
-    const eta = from.eta.map((value, k) => (1 - t) * value + t * to.eta[(k + shift) % MORPH_STATIONS]);
-    return integrated(mixed, eta);
-  };
-  return { fit, at };
+/** A strip turned by a unit quaternion. */
+function turnedBy(q, strip) {
+  const columns = directors(...q),
+    turn = (a) => columns.reduce((sum, column, i) => along(sum, a[i], column), [0, 0, 0]),
+    result = Float64Array.from(strip);
+  for (let at = 0; at < strip.length; at += STATION)
+    for (let i = 0; i < 12; i += 3) result.set(turn(strip.subarray(at + i, at + i + 3)), at + i);
+  return result;
 }
 
-/** A closed strip from its frames: the mean tangent is taken out, and its middle lies at the origin. */
-function integrated(mixed, eta) {
-  const n = mixed.length,
-    rows = mixed.map((q) => directors(...q)),
-    mean = rows.reduce((sum, d) => along(sum, 1 / n, d[2]), [0, 0, 0]),
-    step = (2 * Math.PI) / n,
-    places = [];
-  let x = [0, 0, 0];
-  for (let k = 0; k < n; k++) {
-    places.push(x);
-    const here = along(along([0, 0, 0], 0.5, rows[k][2]), 0.5, rows[(k + 1) % n][2]);
-    x = along(x, step, along(here, -1, mean));
-  }
-  const middle = places.reduce((sum, place) => along(sum, 1 / n, place), [0, 0, 0]);
-  const flat = new Float64Array(n * STATION);
-  rows.forEach((d, k) => flat.set([...along(places[k], -1, middle), ...d.flat(), eta[k]], k * STATION));
-  return flat;
+/** The way down as a function of t, 0 ... 1; it begins as the strip `first` stands, and ends as `last` does, if there is one. */
+function descent({ columns, shapes }, first, last) {
+  const way = new Branch({ columns, shapes, file: "descent", domain: "loop" }, now.family),
+    end = way.size - 1,
+    laid = (s, over) => aligned(frames(way.strip(s)), frames(over));
+  const from = laid(0, first),
+    to = last ? laid(end, last) : from;
+  return (t) => turnedBy(between(from, to, t), way.strip(t * end));
 }
 
-/** The state that a strip at this place may snap to: of those of lower energy, stable if one is, the most alike; or null. */
-function snapTarget(branch, s) {
-  const energy = branch.value("energy", s),
-    lower = coexisting(branch, s).filter((one) => one.branch !== branch && one.energy < energy - 1e-9),
-    stable = lower.filter((one) => stability(one.branch, one.s)[0] === "stable");
-  const found = (stable.length ? stable : lower).map((one) => ({
-    ...one,
-    path: morph(branch.strip(s), one.branch.strip(one.s)),
-  }));
-  return found.reduce((best, one) => (best && best.path.fit >= one.path.fit ? best : one), null);
+/** The fold here with its way down; undefined where no stable strip comes to a fold. */
+const wayHere = () => (!now.branch.leftOut && (markAt(now.branch, now.s) || {}).way) || undefined;
+const canSnap = () => Boolean(wayHere() && wayHere().shapes);
+
+/** The place on the page of the state in which a strip comes to rest; undefined where the page does not hold it. */
+function restOf({ m, n, kind, energy }, kappa) {
+  const there = now.family.branches.filter((one) => one.m === m && (kind === "circle" ? one.circle : one.n === n && !("origin" in one)));
+  const places = there.flatMap((branch) => branch.places(kappa).map((s) => ({ branch, s })));
+  const off = ({ branch, s }) => Math.abs(branch.value("energy", s) - energy);
+  return places.sort((a, b) => off(a) - off(b))[0];
 }
 
-/** Whether a strip can come to this place and must leave it: a fold, and stable on one side if the index is known. */
-function canSnap() {
-  const { branch, s } = now;
-  if (!STRIPS || branch.leftOut || (markAt(branch, s) || {}).kind !== "fold") return false;
-  return !branch.hasIndex || [-0.5, 0.5].some((side) => branch.index(s + side) === 0);
-}
+const restName = ({ kind, m, n }) => (kind === "circle" ? `the ${loopName(m)}` : kind === "unknown" ? "a state on none of the primary branches" : `a shape of the branch (${m}, ${n})`);
 
-/** Play the way from the fold to the state that `snapTarget` finds, then stay there. */
+/** Play the way down from the fold, then stay where it ends. */
 async function snap() {
-  const target = canSnap() && !now.morph && snapTarget(now.branch, now.s);
-  if (!target) return;
+  if (!canSnap() || now.falling) return;
   if (now.playing) await play();
-  const begin = performance.now(),
-    from = now.branch;
+  const way = wayHere(),
+    from = now.branch,
+    rest = restOf(way.ends[0], way.kappa_n),
+    at = descent(way, from.strip(now.s), rest && !rest.branch.leftOut && rest.branch.strip(rest.s)),
+    begin = performance.now();
   $("story").textContent =
-    `A picture between two shapes, not the dynamics: towards the ${nameOf(target.branch)}, of the ` +
-    `${stability(target.branch, target.s)[0] === "stable" ? "stable " : ""}states of lower energy the one most alike.`;
-  now.snaps = { to: target.branch.id, energy: target.energy, fit: target.path.fit };
+    `Let go at κₙL/2π = ${short(way.kappa_n)}, just past the fold, the strip follows its energy down and comes to rest as ` +
+    `${way.ends.map(restName).join(" or, with other damping, as ")}. This is a descent without inertia, not the motion in time.`;
   for (let t = 0; t < 1 && now.branch === from;) {
     const time = await new Promise(requestAnimationFrame);
-    t = Math.min(1, Math.max(0, time - begin) / MORPH_TIME);
-    now.morph = target.path.at(t * t * (3 - 2 * t));
+    t = Math.min(1, Math.max(0, time - begin) / DESCENT_TIME);
+    now.falling = at(t);
     await updateState();
   }
-  now.morph = null;
-  await (now.branch === from ? go(target.branch, target.s) : update());
+  now.falling = null;
+  await (now.branch === from && rest ? go(rest.branch, rest.s) : update());
 }

@@ -68,16 +68,28 @@ function stability(branch, s) {
 const markAt = (branch, s) => (branch.marks || []).find((mark) => Math.abs(mark.point - s) < 1e-6);
 
 const MARK_WORDS = {
-  fold: "At this fold the branch turns back: push the strip on, and it snaps to another shape.",
   secondary: "Another branch, with less symmetry, crosses here.",
   limit: "The computation was told to stop here; the branch goes on.",
 };
 
 const STEADY = {
   stable: "It is stable: push it a little and it comes back.",
-  unstable: "It is unstable: it can rest here, but the least push makes it leave.",
+  unstable: "It is unstable: forces balance, but the least push makes it leave.",
   unknown: "",
 };
+
+/** What a fold means for a strip: it depends on the stability of both sides, and without that nothing is said. */
+function foldWords(branch, s) {
+  const sides = [-0.5, 0.5].map((side) => stability(branch, s + side)),
+    kinds = sides.map(([kind]) => kind);
+  if (kinds.includes("unknown")) return "At this fold the branch turns back.";
+  if (!kinds.includes("stable"))
+    return `At this fold the branch turns back. It is unstable on both sides (index ${sides.map(([, , index]) => index).join(" and ")}): no strip comes here by itself.`;
+  const { way } = markAt(branch, s);
+  const words = "At this fold the branch turns back and is no longer stable: a strip that is pushed on snaps.";
+  if (!way) return `${words} A page of fewer branches shows where to.`;
+  return way.failed ? `${words} Where to is not known: ${way.failed}.` : words;
+}
 
 function story() {
   const { branch, s } = now,
@@ -93,5 +105,6 @@ function story() {
     "origin" in branch
       ? `This shape has less symmetry than the branch (${branch.m}, ${branch.n}) that it comes from.`
       : `This branch leaves the ${loopName(branch.m)} with ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, and ${to}.`;
+  if (mark && mark.kind === "fold") return `${way} ${foldWords(branch, s)}`;
   return `${way} ${(mark && MARK_WORDS[mark.kind]) || STEADY[kind]}`;
 }

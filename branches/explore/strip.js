@@ -66,7 +66,7 @@ function triadLines(strip, scale) {
 const sceneAxis = { visible: false, range: [-1, 1], autorange: false };
 
 /** The strip at the chosen place, or on its way to another one. */
-const shownStrip = () => now.morph || now.branch.strip(now.s);
+const shownStrip = () => now.falling || now.branch.strip(now.s);
 
 async function createState() {
   if (!SHAPES) return drawProfile();

@@ -14,6 +14,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from branches.explore.packing import column, compressed
+from branches.explore.snaps import way_down
 from branches.explore.solutions import solutions
 from branches.scene.closed import ClosedScene, law_of
 from branches.scene.labels import ON_PAGE, kind_of
@@ -41,8 +42,10 @@ _LOOP_NODES, _FEWEST = 384, 16
 _BEYOND, _CIRCLE_STEPS = 0.02, 6
 
 
-def branch_of(path: Path) -> dict:
+def branch_of(path: Path, let_go: bool = True) -> dict:
     """Return what the page holds of a branch file; ``family`` and ``reach`` are for `family_of` alone.
+
+    With ``let_go``, folds that a stable strip reaches have its way down from there.
 
     Raises
     ------
@@ -50,7 +53,7 @@ def branch_of(path: Path) -> dict:
         The file cannot be read, or it holds fewer than two points.
     """
     with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-        return _branch(path, read_kind(path, CLOSED))
+        return _branch(path, read_kind(path, CLOSED), let_go)
 
 
 @functools.cache
@@ -58,7 +61,7 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _branch(path: Path, branch: StoredBranch) -> dict:
+def _branch(path: Path, branch: StoredBranch, let_go: bool) -> dict:
     config, points = branch.config, branch.points
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
@@ -66,6 +69,9 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
         raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
     marks = [_mark(event, branch.reason, branch.scene) for event in branch.events]
+    for mark, event in zip(marks, branch.events):
+        if let_go and mark["kind"] == "fold" and (way := way_down(branch, event)):
+            mark["way"] = way
     about = {
         "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(branch.scene),
         "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),

@@ -7,21 +7,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
-from ribbon_model.descent import METRICS, Descent, Rest, descend, identify, perturbed
+from ribbon_model.descent import KICK, METRICS, PAST, SEGMENTS, Rest, let_go, past
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.linear import energy_interval
 from ribbon_model.second_variation import circle
 from ribbon_model.segments import Strip, discretized
 from ribbon_model.solution import Solution
 
-NU, SEGMENTS = 0.3, 96
-#: How far past its limit a state is let go, relative to 1 + |limit|; root mean square of the kick in the strains.
-PAST, KICK = 0.01, 0.02
+NU = 0.3
 #: (law, covering index, +1 for the upper end of its stable interval) -> what the experiments saw: Table 1 and section 2.
 SEEN = {
     ("ribbon", 3, -1): "single loop (below κₙr₀ = 0.28)",
@@ -62,7 +59,7 @@ def snaps(folder: Path) -> Section:
     rows, films = [], []
     with threadpool_limits(1, "blas"):  # the matrices are small
         for start in _starts():
-            runs = [(metric, sign, *_let_go(start, metric, sign)) for metric in METRICS for sign in start.kicks]
+            runs = [(metric, sign, *let_go(start.strip, metric, sign)) for metric in METRICS for sign in start.kicks]
             rows.append(_row(start, runs))
             if start.published and _sees(start.published):
                 films.append((start, runs[0][2]))
@@ -87,15 +84,11 @@ def _starts() -> Iterator[Start]:
         for m in (1, 3, 5, 7):
             for side, limit in zip((-1, 1), energy_interval(law, m, NU)):
                 if math.isfinite(limit) and (m, side) != (7, 1):  # that leads beyond what the paper draws
-                    at = _past(m * limit, side)
+                    at = past(m * limit, side)
                     strip = discretized(circle(law, NU, m, at), SEGMENTS)
                     seen = SEEN.get((law.name, m, side), "")
                     yield Start(f"{law.name}: {m}-covered circle", m, m * limit, at, strip, seen, False)
         yield from (_buckled(law, *where) for where in BUCKLED.get(law, ()))
-
-
-def _past(limit: float, side: int) -> float:
-    return limit + side * PAST * (1 + abs(limit))
 
 
 def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str = "") -> Start:
@@ -111,23 +104,12 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
     branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
     point = branch.labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
-    kappa_n = _past(point["kappa_n"], side)
+    kappa_n = past(point["kappa_n"], side)
     strip = replace(strip, kappa_n=kappa_n)
     return Start(f"{law.name}: buckled ({m}, {n})", m, point["kappa_n"], kappa_n, strip, seen, True)
 
 
 # --- where they end ---------------------------------------------------------------------------------------------------
-
-
-def _let_go(start: Start, metric: str, sign: int) -> tuple[Descent, Rest]:
-    """The way down and its end: a minimum of the energy of the continuous strip, or the segments are too few."""
-    descent = descend(perturbed(start.strip, sign * KICK), metric)
-    rest = identify(descent.end)
-    if not (descent.rests and rest.stability.decided and rest.stability.index == 0):
-        raise ArithmeticError(
-            f"{start.what} at {start.kappa_n:g}: no minimum, gradient {descent.gradient:.1e}, index {rest.stability.index}"
-        )
-    return descent, rest
 
 
 def _row(start: Start, runs) -> Row:
@@ -175,7 +157,7 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
     for line, (start, descent) in zip(figure.subfigures(len(films), 1, squeeze=False)[:, 0], films):
         line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {in_words(f'{start.kappa_n:.3f}')}", fontsize=12)
-        shown = _frames(descent, frames)
+        shown = descent.frames(frames)
         shapes = [strip.shape(241).placed(2 * math.pi) for strip in shown]
         width = min(0.25 / start.m, *(ROOM * widest(shape) for shape in shapes))  # a circle of m turns has the radius 1/m
         reach = reach_of(shapes, width)
@@ -183,11 +165,3 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
             draw_strip(axes, shape, width, reach)
             axes.set_title(in_words(f"energy {strip.energy:.3f}"), fontsize=10, y=0.95)
     return keep(figure, folder, "snaps")
-
-
-def _frames(descent: Descent, count: int) -> list[Strip]:
-    """States at equal distances along the way, the first and the last among them."""
-    strains = np.array([strip.strains for strip in descent.strips])
-    steps = np.sqrt(np.mean(np.sum(np.diff(strains, axis=0) ** 2, axis=2), axis=1))
-    way = np.concatenate([[0], np.cumsum(steps)])
-    return [descent.strips[int(np.argmin(np.abs(way - place)))] for place in np.linspace(0, way[-1], count)]
