@@ -46,9 +46,12 @@ def main(argv=None) -> int:
     if words[:1] == ["completion"]:
         return _complete(words[1:])
     if not words or words[0] not in (*COMMANDS, "scenes"):
-        problem = f"there is no command {words[0]!r}" if words else "a command is needed"
-        known = ", ".join((*COMMANDS, "scenes"))
-        sys.stderr.write(f"error: {problem}; the commands are {known} (--help describes them)\n")
+        problem, known = "a command is needed", (*COMMANDS, "scenes")
+        if words:
+            from branches.scene.meant import meant
+
+            problem = f"there is no command {words[0]!r}{meant(words[0], known)}"
+        sys.stderr.write(f"error: {problem}; the commands are {', '.join(known)} (--help describes them)\n")
         return EXIT_BAD_INPUT
     import runpy
 

@@ -27,7 +27,7 @@ from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, parse
 from branches.store.branch import StoredBranch
 from branches.store.command import Parser, complain, write_output
-from branches.store.files import StoreError, prepare, write_bytes
+from branches.store.files import StoreError, check_folder_name, prepare, write_bytes
 from branches.store.read import complete_run, read_branch
 from contin import ContinError
 from ribbon_model.domains import CELL, HALF_LOOPS
@@ -249,8 +249,7 @@ def main(argv=None) -> int:
     result = Path(options.result)
     folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")
     try:
-        if folder.exists() and not folder.is_dir():
-            raise ConfigError(f"--out {str(folder)!r}: must be a folder")
+        check_folder_name(folder)
         with Progress("secondary bifurcations", quiet=options.quiet) as progress:
             switches = follow_all(result, folder, options.set, progress)
     except (ConfigError, StoreError, ContinError) as error:

@@ -10,7 +10,6 @@ from branches.explore import open_strips, profiles, strips
 from branches.graph.stored import DIAGRAM, read_any
 from branches.run.executor import executor, run_jobs
 from branches.run.progress import Progress
-from branches.store.command import typed
 from branches.store.files import StoreError
 from branches.store.layout import OPEN
 from branches.store.read import read_branch
@@ -50,11 +49,11 @@ def gather(results: list[str], quiet: bool = True) -> dict:
         found, title = _files_of(Path(result))
         files |= {path.resolve(): path for path in found if path.resolve() not in files}
         titles.append(title)
-    stored = [path for path in files if path.suffix == STORED]
+    stored = [path for path in files.values() if path.suffix == STORED]
     if not stored:
         with Progress("branches", len(files), quiet) as progress:
-            return _of_strips(files, titles, progress)
-    if other := next((path for path in files if path.suffix != STORED), None):
+            return _of_strips(list(files.values()), titles, progress)
+    if other := next((path for path in files.values() if path.suffix != STORED), None):
         raise StoreError(f"{str(other)!r} is of a strip, {str(stored[0])!r} is not; a page shows one kind of result")
     return profiles.gathered(stored)
 
@@ -64,14 +63,14 @@ def left_out(data: dict) -> list[dict]:
     return [branch for family in data["families"] for branch in family["branches"] if not branch["shapes"]]
 
 
-def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -> dict:
-    """Return the data of a page of strips; ``files`` maps each file to its name as given."""
-    if read_branch(next(iter(files))).scene.KIND == OPEN:
-        return open_strips.gathered(list(files), next(filter(None, titles), ""))
-    branches = _read(list(files), progress)
+def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
+    """Return the data of a page of strips."""
+    if read_branch(files[0]).scene.KIND == OPEN:
+        return open_strips.gathered(files, next(filter(None, titles), ""))
+    branches = _read(files, progress)
     title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
     families: dict[tuple, list[dict]] = {}
-    for branch, path in zip(branches, files.values()):
+    for branch, path in zip(branches, files):
         families.setdefault(branch["family"], []).append(branch | {"path": str(path)})
     _leave_out(families)
     return {
@@ -116,8 +115,6 @@ def _leave_out(families: dict[tuple, list[dict]]) -> None:
 
 def _files_of(path: Path) -> tuple[list[Path], str]:
     """The branch files that a result stands for, and its title."""
-    if path.suffix in (".yaml", ".yml"):
-        raise StoreError(f"{str(path)!r} is a scene, not a result; compute it first: {typed('run')} {path}")
     if not path.is_dir():
         return [path], ""
     if not (path / DIAGRAM).exists() and (found := sorted(path.glob(f"*{STORED}"))):

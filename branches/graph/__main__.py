@@ -83,14 +83,25 @@ def _answers(graph, options) -> Iterable[str]:
     if options.at is not None:
         yield from _states(graph, options)
     if options.folds:
-        for data in diagram.folds(graph, *options.folds):
-            place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
-            yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold at {place}"
+        yield from _folds(graph, *options.folds)
     if not options.where and options.at is None and not options.folds:
         found = list(diagram.courses(graph))
         yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
         for (law, nu, m, n), nodes in found:
             yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
+
+
+def _folds(graph, low: float, high: float) -> Iterable[str]:
+    """Yield the folds between two natural curvatures, each with its branch."""
+    if not low < high:
+        raise StoreError(f"--folds {low:g} {high:g}: the first number must be the smaller")
+    found = diagram.folds(graph, low, high)
+    if not found:
+        yield f"no folds between {low:g} and {high:g}"
+    for data in found:
+        branch = f"{'secondary ' * data['secondary']}branch ({data['m']}, {data['n']})"
+        place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
+        yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold of {branch} at {place}"
 
 
 def _states(graph, options) -> Iterable[str]:

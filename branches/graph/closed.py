@@ -319,8 +319,12 @@ def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
 
 
 def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
-    """Return the folds with low <= kappa_n <= high, in order of kappa_n."""
-    nodes = [dict(data) for _, data in graph.nodes(data=True) if data["kind"] == "fold" and low <= data["kappa_n"] <= high]
+    """Return the folds with low <= kappa_n <= high, in order of kappa_n; ``secondary`` says of what kind the branch is."""
+    nodes = [
+        data | {"secondary": any("origin" in edge for *_, edge in graph.edges(name, data=True))}
+        for name, data in graph.nodes(data=True)
+        if data["kind"] == "fold" and low <= data["kappa_n"] <= high
+    ]
     nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
     return sorted(nodes, key=lambda data: data["kappa_n"])
 

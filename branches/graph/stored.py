@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from branches.store import interrupt
-from branches.store.files import StoreError, write_bytes
+from branches.store.files import DIAGRAM, StoreError, no_diagram, write_bytes
 
-#: The files of a diagram, in two formats.
-DIAGRAM, GRAPHML = "diagram.json", "diagram.graphml"
+#: The diagram in another format.
+GRAPHML = "diagram.graphml"
 #: Names of the formats of diagrams: of closed strips, and of open ones.
 CLOSED_FORMAT, OPEN_FORMAT = "ribbon bifurcation diagram", "open strip diagram"
 #: Columns of a branch that an edge carries in a diagram of closed strips.
@@ -89,10 +89,11 @@ def read_any(folder: str | Path):
         elif graph.graph["format"] != OPEN_FORMAT:
             raise KeyError("format")
         return graph
-    except OSError as error:
-        raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, networkx.NetworkXException) as error:
-        raise StoreError(f"cannot read {str(path)!r}: it is not a diagram written by this program") from error
+    except (
+        OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, networkx.NetworkXException
+    ) as error:  # fmt: skip
+        told = error.strerror if isinstance(error, OSError) and path.exists() else no_diagram(path)
+        raise StoreError(f"cannot read {str(folder)!r}: {told}") from error
 
 
 def _check(graph) -> None:

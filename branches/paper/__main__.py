@@ -67,12 +67,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     survive_any_encoding()
     unknown = [name for name in options.items if name not in ITEMS]
     if unknown:
-        complain(f"error: there is no item {', '.join(map(repr, unknown))}; known are {', '.join(ITEMS)}")
+        from branches.scene.meant import meant
+
+        near = [f"{name!r}{meant(name, ITEMS)}" for name in unknown]
+        complain(f"error: there is no item {', '.join(near)}; known are {', '.join(ITEMS)}")
         return 2
     folder = Path(options.out)
-    from branches.store.files import StoreError, prepare
+    from branches.store.files import StoreError, check_folder_name, prepare
 
     try:
+        check_folder_name(folder)
         prepare(folder / "index.md")  # before the work, not after it
         _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS), options.quiet)
     except StoreError as error:

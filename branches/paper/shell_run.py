@@ -26,7 +26,7 @@ from branches.run.executor import cores, run_jobs
 from branches.run.progress import Progress
 from branches.store import interrupt
 from branches.store.command import Parser, complain, survive_any_encoding, write_output
-from branches.store.files import StoreError, only_run, prepare, write_bytes
+from branches.store.files import StoreError, check_hdf5_name, only_run, prepare, write_bytes
 from contin.lowlevel import exact_text
 
 PROGRAM = "ccx"
@@ -420,6 +420,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinding also ends CalculiX
     cases = DEFAULT + FULLER if options.full else DEFAULT
     try:
+        check_hdf5_name(options.out)
         compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
         outcomes = read(options.out)
     except (ShellError, StoreError) as error:

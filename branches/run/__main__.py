@@ -61,6 +61,7 @@ def main(argv=None) -> int:
 def _run(options) -> int:
     from branches.scene.fields import ConfigError
     from branches.scene.parse import found, load
+    from branches.store.files import StoreError
 
     options.config = found(options.config)
     try:
@@ -68,13 +69,12 @@ def _run(options) -> int:
         if scene.many:
             return _run_many(scene, options)
         path = output_path(options)
-    except ConfigError as error:
+    except (ConfigError, StoreError) as error:
         return _refuse(error)
     from branches.run.progress import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.run.runner import run_scene
-    from branches.store.files import StoreError
     from contin import ContinError
 
     try:
@@ -108,6 +108,7 @@ def _run_many(sweep, options) -> int:
     from pathlib import Path
 
     from branches.scene.fields import ConfigError
+    from branches.store.files import StoreError, check_folder_name
 
     if options.resume:
         raise ConfigError(
@@ -118,14 +119,12 @@ def _run_many(sweep, options) -> int:
     if not options.time_limit > 0:
         raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
     folder = Path(options.out or Path(options.config).stem)
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
+    check_folder_name(folder)
     from branches.run.progress import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.run.executor import ExecutorError
     from branches.run.many import run_many
-    from branches.store.files import StoreError
     from contin import ContinError
 
     try:
@@ -151,19 +150,20 @@ def output_path(options):
 
     Raises
     ------
-    ConfigError
-        A file or folder in its place that no result may replace.
+    ConfigError, StoreError
+        A name that is not that of a branch, or a file or folder in its place that no result may replace.
     """
     from pathlib import Path
 
     from branches.scene.fields import ConfigError
+    from branches.store.files import BRANCHES, check_hdf5_name
 
     if options.out == "":
         raise ConfigError("--out '': must name a file or a folder")
     name = Path(options.config).stem + ".h5"
     path = Path(options.out or name)
     try:
-        if path.is_dir() or (options.out or "").endswith(("/", os.sep)):
+        if (options.out or "").endswith(("/", os.sep)) or path.is_dir() and path.suffix not in BRANCHES:
             path = path / name
         if path.is_dir():
             raise ConfigError(f"--out {str(path)!r}: is a folder; name a file, or another folder")
@@ -171,6 +171,7 @@ def output_path(options):
             raise ConfigError(f"--out {str(path)!r}: is neither a file nor a folder")
         if path.exists() and path.samefile(options.config):
             raise ConfigError(f"--out {str(path)!r}: is the config itself; name another file")
+        check_hdf5_name(path, or_folder=True)
     except OSError as error:
         raise ConfigError(f"--out {str(path)!r}: cannot be accessed: {error.strerror}") from error
     return path

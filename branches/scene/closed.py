@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, plain, show
+from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, missing, show, unknown
+from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, Law
@@ -26,7 +27,7 @@ class OriginConfig(Strict):
 def _known_law(name: str) -> str:
     if name not in LAWS:
         *others, last = map(repr, LAWS)
-        raise ValueError(f"must be {', '.join(others)} or {last}, not {name!r}")
+        raise ValueError(f"must be {', '.join(others)} or {last}, not {name!r}{meant(name, LAWS)}")
     return name
 
 
@@ -199,9 +200,8 @@ class ClosedScene(Scene):
         if "origin" in values:
             raise ValueError("origin: must not be given in a scene of many branches")
         if "pairs" not in values:
-            for key in ("m", "n"):
-                if key not in values:
-                    raise ValueError(f"the field {key!r} is missing")
+            if absent := [key for key in ("m", "n") if key not in values]:
+                raise ValueError(missing(absent))
             return super().axes(values, lists)
         if "m" in values or "n" in values:
             raise ValueError("pairs: must not be given together with m or n")
@@ -251,10 +251,9 @@ def _of_strip(values: dict) -> dict:
         raise ValueError(f"strip: must hold the fields {', '.join(NAMES)}, not {show(strip)}")
     for field in strip:
         if field not in NAMES:
-            raise ValueError(f"unknown field 'strip.{plain(str(field))}'; the fields are {', '.join(NAMES)}")
-    for field in NAMES:
-        if field not in strip:
-            raise ValueError(f"the field 'strip.{field}' is missing")
+            raise ValueError(unknown(f"strip.{field}", NAMES))
+    if absent := [f"strip.{field}" for field in NAMES if field not in strip]:
+        raise ValueError(missing(absent))
     for field in _FROM_STRIP:
         if field in values:
             raise ValueError(f"{field}: must not be given together with strip, which determines it")

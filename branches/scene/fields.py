@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from branches.scene.meant import meant
 from contin.lowlevel import exact_text
 
 
@@ -84,6 +85,24 @@ def plain(text: str) -> str:
     """Return a text for a message: one line of bounded length."""
     text = text if text.isprintable() else repr(text)[1:-1]
     return text if len(text) <= 200 else text[:197] + "..."
+
+
+def missing(fields: Sequence[str]) -> str:
+    """Return the sentence about fields that are missing.
+
+    Examples
+    --------
+    >>> missing(["m"]), missing(["m", "n"])
+    ("the field 'm' is missing", "the fields 'm' and 'n' are missing")
+    """
+    *others, last = map(repr, fields)
+    return f"the fields {', '.join(others)} and {last} are missing" if others else f"the field {last} is missing"
+
+
+def unknown(field: str, known: Sequence[str]) -> str:
+    """Return the sentence about a field that is none of the known ones; ``mesh.degre`` is one inside another."""
+    near = meant(field.rpartition(".")[2], known)
+    return f"unknown field {plain(field)!r}{near}; the fields are {', '.join(known)}"
 
 
 class Scene(Strict):

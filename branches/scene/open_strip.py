@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
+from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, quantity
 from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
@@ -256,16 +257,20 @@ class OpenScene(Scene):
             strip = self.strip(number)
             if stage.follow not in strip.parameters:
                 followed = ", ".join(strip.parameters)
-                raise ValueError(f"stage {number}: follow: {stage.follow!r} must be one of the numbers here: {followed}")
+                near = meant(stage.follow, strip.parameters)
+                raise ValueError(f"stage {number}: follow: {stage.follow!r}{near} must be one of the numbers here: {followed}")
             if number == 1 and (stage.start_at or stage.stage):
                 raise ValueError("stage 1: start_at: the first stage starts from the first state")
             for name in stage.numbers:
                 if name not in strip.parameters:
-                    raise ValueError(f"stage {number}: numbers: {name!r} must be one of {', '.join(strip.parameters)}")
+                    near = meant(name, strip.parameters)
+                    raise ValueError(f"stage {number}: numbers: {name!r}{near} must be one of {', '.join(strip.parameters)}")
             for name in (*stage.limits, *stage.label):
                 if name not in (*strip.parameters, *PLACE, "energy"):
-                    known = ", ".join(dict.fromkeys((*strip.parameters, *PLACE, "energy")))
-                    raise ValueError(f"stage {number}: {name!r} must be one of the columns {known}")
+                    known = dict.fromkeys((*strip.parameters, *PLACE, "energy"))
+                    raise ValueError(
+                        f"stage {number}: {name!r}{meant(name, known)} must be one of the columns {', '.join(known)}"
+                    )
         return self
 
     # --- the strip ----------------------------------------------------------------------------------------------------

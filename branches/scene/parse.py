@@ -12,7 +12,8 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from branches.scene.closed import ClosedScene
-from branches.scene.fields import ConfigError, Scene, plain, show
+from branches.scene.fields import ConfigError, Scene, missing, plain, show, unknown
+from branches.scene.meant import meant
 
 if TYPE_CHECKING:
     from branches.scene.sweep import Sweep
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 _MOST_BRANCHES = 10_000
 #: Largest size of a scene. Scenes have a few lines; a larger file is not a scene (or is a device that never ends).
 _MOST_BYTES = 1_000_000
+#: The first bytes of an HDF5 file, by its specification.
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
@@ -36,12 +39,17 @@ def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
             data = file.read(_MOST_BYTES + 1)
         text = data.decode("utf-8")
     except FileNotFoundError as error:
+        near = meant(
+            Path(path).name, (*(one.stem for one in scenes()), *(one.name for one in Path(path).parent.glob("*.y*ml")))
+        )
         of_package = "'ribbon scenes' lists those of the package"
-        raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}; {of_package}") from error
+        raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}{near}; {of_package}") from error
     except OSError as error:
-        raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}") from error
+        told = "it is a folder; a scene is a YAML file" if Path(path).is_dir() else error.strerror
+        raise ConfigError(f"cannot read the config {str(path)!r}: {told}") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"cannot read the config {str(path)!r}: it is not UTF-8 text") from error
+        told = "it is a result, which 'ribbon plot' draws" if data.startswith(_HDF5) else "it is not UTF-8 text"
+        raise ConfigError(f"cannot read the config {str(path)!r}: {told}") from error
     if len(data) > _MOST_BYTES:
         raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte; a scene must be smaller")
     return parse(text, plain(str(path)), settings)
@@ -181,8 +189,8 @@ def _where(complaint) -> str:
 
 
 def _origin(error: ValidationError, name: str, settings: Sequence[str]) -> str:
-    """Return the setting that the first error is about, otherwise the file."""
-    where = _where(error.errors()[0])
+    """Return the setting that the sentence is about, otherwise the file."""
+    where = _where(_in_order(error)[0])
     for setting in reversed(settings):
         key = setting.partition("=")[0].strip()
         if f"{where}.".startswith(f"{key}.") or f"{key}.".startswith(f"{where}."):
@@ -190,15 +198,21 @@ def _origin(error: ValidationError, name: str, settings: Sequence[str]) -> str:
     return name
 
 
+def _in_order(error: ValidationError) -> list:
+    """Return the complaints, unknown fields first: one that is mistyped is missing, too."""
+    return sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+
+
 def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
-    """Return the first error as `field: value ... what is allowed`, and the number of further errors."""
-    errors = error.errors()
-    first = errors[0]
+    """Return the first complaint as `field: value ... what is allowed`, and the number of further ones."""
+    errors = _in_order(error)
+    first, told = errors[0], 1
     where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")
     if kind == "extra_forbidden":
-        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc'], model))}"
+        text = unknown(where, _fields(first["loc"], model))
     elif kind == "missing":
-        text = f"the field {where!r} is missing"
+        absent = [_where(one) for one in errors if one["type"] == "missing"]
+        text, told = missing(absent), len(absent)
     elif kind == "value_error":
         text = f"{where}: {message}" if where else message
     elif kind in ("model_type", "dict_type"):
@@ -206,7 +220,9 @@ def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
     else:
         message = message.replace("Input should be", "must be")
         text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
-    return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
+        if kind == "literal_error":
+            text += meant(str(first["input"]), re.findall("'([^']+)'", first["ctx"]["expected"]))
+    return text + (f" (and {len(errors) - told} more)" if len(errors) > told else "")
 
 
 def _fields(location, model: type[BaseModel]) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 from branches.scene.columns import Columns
 from branches.scene.fields import Scene
 from branches.scene.labels import SPECIAL, Label, label_of
+from branches.scene.meant import meant
 from branches.scene.parse import dump
 from branches.scene.stages import stages_of
 from branches.store.files import StoreError
@@ -143,7 +144,7 @@ class StoredBranch(ABC):
         known = self.columns.all.get(name)
         if known is None or known.derived is None:
             there = [*self.columns.shown(), *(one.name for one in self.columns.all.values() if one.derived)]
-            raise StoreError(f"there is no column {name!r} of numbers; there are {', '.join(there)}")
+            raise StoreError(f"there is no column {name!r} of numbers{meant(name, there)}; there are {', '.join(there)}")
         return known.derived(self.points)
 
     @abstractmethod

@@ -25,6 +25,18 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, command: str, description: str, epilog: str | None = None):
         super().__init__(typed(command), allow_abbrev=False, description=description, epilog=epilog)
 
+    def parse_args(self, args=None, namespace=None):
+        """Return the options; a mistyped one is named before those that are then missing."""
+        for word in sys.argv[1:] if args is None else args:
+            name = word.partition("=")[0]
+            if word == "--":
+                break
+            if name.startswith("--") and name not in self._option_string_actions:
+                from branches.scene.meant import meant
+
+                self.error(f"there is no option {name}{meant(name, self._option_string_actions)}")
+        return super().parse_args(args, namespace)
+
     def error(self, message):
         complain(f"error: {message} (--help shows what there is)")
         raise SystemExit(2)

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from branches.scene.meant import meant
 from branches.store import interrupt
+from branches.store.command import typed
 from contin.lowlevel import temporary_name, write_whole
 
 #: Bytes of the smallest result; as many are written to test the disk before a computation.
@@ -46,6 +48,58 @@ def write_bytes(path: Path, data: bytes) -> None:
             write_whole(path, data)
     except OSError as error:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+#: The file of a diagram in its folder.
+DIAGRAM = "diagram.json"
+#: Endings of the files of branches; the first one is that of files which are not named.
+BRANCHES = (".h5", ".hdf5")
+#: Endings of files: a folder with such a name would be taken for one.
+_OF_FILES = (*BRANCHES, ".csv", ".htm", ".html", ".json", ".npz", ".pdf", ".png", ".svg", ".yaml", ".yml")
+
+
+def check_hdf5_name(path: Path, or_folder: bool = False) -> None:
+    """Raise StoreError if ``path`` is no name for an HDF5 file; ``or_folder`` says that a folder could be named instead."""
+    if path.suffix.lower() not in BRANCHES:
+        more = f", or be a folder, as in {path.stem + '/'!r}" if or_folder else ""
+        raise StoreError(f"--out {str(path)!r}: must end in {' or '.join(BRANCHES)}{more}")
+
+
+def check_folder_name(path: Path) -> None:
+    """Raise StoreError if ``path`` is no folder and no name for one."""
+    if path.exists() and not path.is_dir():
+        raise StoreError(f"--out {str(path)!r}: must be a folder, and is a file")
+    if path.suffix.lower() in _OF_FILES:
+        raise StoreError(f"--out {str(path)!r}: must be a folder, as in {path.stem!r}; this is a name of a file")
+
+
+def absent(path: Path) -> str:
+    """Return that there is no such file, and the one beside it that was probably meant."""
+    beside = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
+    return f"there is no such file{meant(path.name, beside)}"
+
+
+def no_branch(path: Path) -> str:
+    """Return what a path is that is not the file of a branch, and what to do."""
+    if not path.exists():
+        return absent(path)
+    if path.is_dir():
+        found = sorted(file for file in path.iterdir() if file.suffix in BRANCHES)
+        return f"it is a folder; name one of its branches, such as {found[0]}" if found else "it is a folder, without branches"
+    if path.suffix in (".yaml", ".yml"):
+        return f"it is a scene; compute its result first: {typed('run')} {path}"
+    return "it is not a readable HDF5 file"
+
+
+def no_diagram(path: Path) -> str:
+    """Return what a path is that is not a diagram, and what to do."""
+    if path.name == DIAGRAM and path.parent.is_dir() and not path.exists():
+        return f"the folder holds no {DIAGRAM}, which a scene of many branches writes"
+    if not path.exists():
+        return absent(path)
+    if path.suffix in BRANCHES:
+        return f"it is one branch, not a diagram; {typed('plot')} {path} draws it"
+    return "it is not a diagram written by this program"
 
 
 #: Locks that this process holds, by the file locked.

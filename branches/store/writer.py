@@ -21,7 +21,7 @@ import numpy as np
 from branches.scene.columns import NUMBER, Row
 from branches.scene.parse import dump
 from branches.scene.stage import Stage
-from branches.store.files import StoreError, write_bytes
+from branches.store.files import StoreError, no_branch, write_bytes
 from branches.store.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Point
 from contin.lowlevel import Collocation, State, Stop
@@ -278,8 +278,7 @@ def open_branch(path: Path):
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        reason = "there is no such file" if not Path(path).exists() else "it is not a readable HDF5 file"
-        raise StoreError(f"cannot read {str(path)!r}: {reason}") from error
+        raise StoreError(f"cannot read {str(path)!r}: {no_branch(Path(path))}") from error
     with file, damage_told(path):
         check(file, path)
         yield file

@@ -47,7 +47,10 @@ def test_a_command_does_the_same_as_its_module(command):
 
 def test_an_unknown_command_is_answered_in_one_sentence(call):
     done = call(cli.main, "rum")
-    assert done.returncode == 2 and done.err.startswith("error: there is no command 'rum'; the commands are run, ")
+    assert done.returncode == 2 and done.err.startswith(
+        "error: there is no command 'rum' (did you mean 'run'?); the commands are run, "
+    )
+    assert call(cli.main, "frobnicate").err.startswith("error: there is no command 'frobnicate'; the commands are run, ")
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
@@ -91,7 +94,8 @@ def test_scenes_of_the_package_are_listed_and_run_by_name(command, root):
     assert all(len(line.split()) > 1 for line in listed.splitlines())
     assert command("scenes", "--help", program=PROGRAM).out.startswith("usage: ribbon scenes")
     assert command("scenes", "x", program=PROGRAM).err == "error: unrecognized arguments: x (--help shows what there is)\n"
-    assert command("run", "m1_n9", program=PROGRAM).err.endswith("; 'ribbon scenes' lists those of the package\n")
+    unknown = command("run", "m1_n22", program=PROGRAM).err
+    assert unknown.endswith(" (did you mean 'm1_n2'?); 'ribbon scenes' lists those of the package\n")
     assert [line.split()[0] for line in listed.splitlines()] == sorted(file.stem for file in (root / "configs").glob("*.yaml"))
     done = command("run", "m1_n2", "--quiet", "--set", "steps.max_points=3", program=PROGRAM)
     assert done.returncode == 0 and (command.folder / "m1_n2.h5").exists()

@@ -3,6 +3,7 @@
 import math
 from typing import get_args
 
+import h5py
 import pytest
 from pydantic import ValidationError
 
@@ -174,7 +175,17 @@ def test_files_that_are_no_scene(tmp_path):
     binary.write_bytes(bytes(range(256)))
     latin.write_bytes("title: é\n".encode("latin-1"))
     large.write_bytes(b"#" * 2_000_000)
-    files = {tmp_path / "none.yaml": "No such file", tmp_path: "directory", binary: "UTF-8", latin: "UTF-8", large: "megabyte"}
+    result = tmp_path / "result.h5"
+    h5py.File(result, "w").close()
+    with pytest.raises(ConfigError, match="it is a result, which 'ribbon plot' draws"):
+        load(result)
+    files = {
+        tmp_path / "none.yaml": "No such file",
+        tmp_path: "it is a folder; a scene is a YAML file",
+        binary: "UTF-8",
+        latin: "UTF-8",
+        large: "megabyte",
+    }
     for path, said in files.items():
         with pytest.raises(ConfigError, match=said) as caught:
             load(path)

@@ -17,6 +17,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from branches.explore.gather import gather
+from branches.export.__main__ import main as export_command
 from branches.graph import closed as diagram
 from branches.graph import picture as draw_diagram
 from branches.graph.__main__ import main as graph_command
@@ -123,6 +124,28 @@ def test_folds_in_a_window(folder):
     found = diagram.folds(read(folder), -8, 14)
     expected = [p.kappa_n for m, n in ((1, 2), (1, 3), (3, 4)) for p in exact.folds(m, n, 0.3)]
     assert [node["kappa_n"] for node in found] == pytest.approx(sorted(k for k in expected if -8 < k < 14), abs=1e-9)
+
+
+def test_folds_are_listed_with_their_branches(folder, call):
+    listed = call(graph_command, folder, "--folds", -8, 14).out.splitlines()
+    assert len(listed) == len(diagram.folds(read(folder), -8, 14))
+    assert [line for line in listed if line.startswith("ribbon, nu = 0.3: fold of branch (1, 2) at kappa_n = 4.075667535")]
+    assert call(graph_command, folder, "--folds", 4.1, 4.2).out == "no folds between 4.1 and 4.2\n"
+    assert call(graph_command, folder, "--folds", 14, -8).err == "error: --folds 14 -8: the first number must be the smaller\n"
+
+
+def test_what_is_no_diagram_is_told_with_the_command_for_it(folder, call, tmp_path):
+    branch = next(folder.glob("*.h5"))
+    said = call(graph_command, branch).err
+    assert "it is one branch, not a diagram; " in said and f"plot {branch} draws it" in said
+    assert f"name one of its branches, such as {folder}" in call(export_command, folder, "--point", "LP", "--out", "a.stl").err
+    (tmp_path / "empty").mkdir()
+    assert "the folder holds no diagram.json" in call(graph_command, "empty").err
+    assert "there is no such file (did you mean 'empty'?)" in call(graph_command, "emty").err
+    (tmp_path / "scene.yaml").write_text("{m: 1, n: 2}")
+    assert (
+        "it is a scene; compute its result first: " in call(export_command, "scene.yaml", "--point", "LP", "--out", "a.stl").err
+    )
 
 
 def test_exports(folder):

@@ -35,9 +35,9 @@ MISTAKES = {
     TIP.replace("free", "fre"): "finish: 'fre' must be clamped, hinged, ball joint, free",
     TIP.replace("free", "{rotation: hinged}"): "finish: about: is missing; the rotation 'hinged' needs it",
     TIP.replace("free", "{about: width}"): "finish: about: belongs to the rotation hinged or joint",
-    TIP.replace("free", "{slides: width}"): "unknown field 'finish.slides'; the fields are rotation, about",
+    TIP.replace("free", "{slides: width}"): "unknown field 'finish.slides' (did you mean 'slides_along'?); the fields are",
     TIP.replace("free", "{slides_along: up}"): "must be width, normal, tangent or three numbers, not 'up'",
-    TIP.replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
+    TIP.replace("to: -6", "too: -6"): "unknown field 'stages.0.too' (did you mean 'to'?)",
     TIP.replace("force_width", "force"): "stage 1: follow: 'force' must be one of the numbers here",
     TIP.replace("-6}", "-6, start_at: BP}"): "stage 1: start_at: the first stage starts from the first state",
     TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
@@ -49,13 +49,13 @@ MISTAKES = {
     TIP.replace("0.3", "[]"): "material.nu: must be a number, or a list of numbers, not []",
     TIP.replace("0.3", "[0.3, 0.30]"): "the branch nu = 0.3 is listed twice",
     TIP.replace("0.3", "[0.8, 0.9]"): "none of its branches can be run (nu: 0.8 must be",
-    TIP.replace("0.3", "[0.2, 0.3]").replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
+    TIP.replace("0.3", "[0.2, 0.3]").replace("to: -6", "too: -6"): "unknown field 'stages.0.too' (did you",
     TIP + "closed: {half_twists: 1}\n": "closed: must not be given together with start or finish",
     TIP + "numbers: {distance: 1}\n": "numbers: distance is used by nothing here",
     TIP + "along: {kappa_n: 'exp(x)'}\n": "along: kappa_n: 'exp(x)': 'x' is not allowed",
     TIP + "along: {kappa_n: [[0, 1]]}\n": "a table must have 2 to 12 points",
     TIP + "along: {kappa_n: [[0, 1], [0.5, 2]]}\n": "the places s of a table must increase from 0 to 1",
-    TIP + "dimensions: {width: 1}\n": "the field 'dimensions.thickness' is missing",
+    TIP + "dimensions: {width: 1}\n": "the fields 'dimensions.thickness', 'dimensions.length', 'dimensions",
 }  # fmt: skip
 
 

@@ -113,8 +113,10 @@ def test_another_item_keeps_those_that_are_there(tmp_path, capsys):
 
 def test_what_is_refused(tmp_path, capsys):
     assert main(["--out", str(tmp_path), "fig13"]) == 2
-    assert "there is no item 'fig13'; known are table1" in capsys.readouterr().err
+    assert "there is no item 'fig13' (did you mean 'fig12'?); known are table1" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
     assert main(["--out", str(tmp_path / "file"), "table3"]) == 2
-    assert "cannot write" in capsys.readouterr().err
+    assert "must be a folder, and is a file" in capsys.readouterr().err
+    assert main(["--out", str(tmp_path / "page.html"), "table3"]) == 2
+    assert "must be a folder, as in 'page'" in capsys.readouterr().err
     assert (tmp_path / "file").read_text() == ""

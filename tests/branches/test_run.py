@@ -140,7 +140,7 @@ def test_help_imports_nothing_heavy(command):
 HALF_LOOP = ["scene.yaml", "--set", "domain=half loop", "--set", "mesh.intervals=8"]
 MISTAKES = {
     "no such config": (["none.yaml"], "cannot read the config 'none.yaml': No such file"),
-    "a folder as config": (["."], "cannot read the config '.': Is a directory"),
+    "a folder as config": (["."], "cannot read the config '.': it is a folder; a scene is a YAML file"),
     "a device as config": (["/dev/zero"], "megabyte"),
     "unknown field": (["scene.yaml", "--set", "foo=1"], "unknown field 'foo'"),
     "impossible value": (["scene.yaml", "--set", "nu=0.7"], "--set nu=0.7: nu: must be less than or equal to 0.5, not 0.7"),
@@ -157,7 +157,17 @@ MISTAKES = {
     "result is a device": (["scene.yaml", "--out", "/dev/null", "--overwrite"], "is neither a file nor a folder"),
     "result is the config": (["scene.yaml", "--out", "scene.yaml", "--overwrite"], "is the config itself"),
     "result without a name": (["scene.yaml", "--out", ""], "--out '': must name"),
-    "name too long": (["scene.yaml", "--out", "x" * 300], "too long"),
+    "name too long": (["scene.yaml", "--out", "x" * 300 + ".h5"], "too long"),
+    "result with the name of a table": (
+        ["scene.yaml", "--out", "x.csv"],
+        "--out 'x.csv': must end in .h5 or .hdf5, or be a folder",
+    ),
+    "result without an ending": (["scene.yaml", "--out", "new"], "or be a folder, as in 'new/'"),
+    "a folder with the name of a file": (
+        ["scene.yaml", "--set", "n=[2]", "--out", "y.h5"],
+        "--out 'y.h5': must be a folder, as in 'y'",
+    ),
+    "a file for a folder": (["scene.yaml", "--set", "n=[2]", "--out", "foreign.h5"], "must be a folder, and is a file"),
     "folder is a file": (["scene.yaml", "--out", "scene.yaml/x.h5"], "scene.yaml' is not a folder"),
     "folder cannot be made": (["scene.yaml", "--out", "/proc/none/x.h5"], "cannot write '/proc/none/x.h5'"),
     "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is not a readable result of this program"),
@@ -168,7 +178,7 @@ MISTAKES = {
 
 
 #: Windows has no devices among its files, makes the folder, and has another word for one.
-OF_POSIX = {"a folder as config", "a device as config", "result is a device", "folder cannot be made"}
+OF_POSIX = {"a device as config", "result is a device", "folder cannot be made"}
 
 
 @pytest.mark.parametrize(
