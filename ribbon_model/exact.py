@@ -63,6 +63,11 @@ class ExactPoint:
     root: ClassVar[int] = 0
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """Those of the law, by name."""
+        return {"nu": self.nu}
+
+    @property
     def amplitude(self) -> float:
         """max(eta**2)."""
         return self.eta_max_squared

@@ -105,6 +105,11 @@ class RodPoint:
     label: str = ""
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """Those of the law, by name."""
+        return {"nu": self.nu}
+
+    @property
     def coordinates(self) -> np.ndarray:
         """The point in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
         return RODS[self.law](self.m, self.n, self.nu, self.root).coordinates(self)

@@ -117,8 +117,8 @@ def _by_quadrature(edge: dict, place: dict, near: State, where) -> Iterator[Stat
     for guess in sorted(points[i : i + 2], key=lambda point: abs(point.kappa_star - near.values["kappa_star"])):
         try:
             point = exact.solve(
-                guess.m, guess.n, guess.nu, guess, kappa_n=place["kappa_n"],
-                law=getattr(guess, "law", "ribbon"), root=getattr(guess, "root", 0),
+                guess.m, guess.n, guess.parameters, guess, kappa_n=place["kappa_n"],
+                law=guess.law, root=getattr(guess, "root", 0),
             )  # fmt: skip
         except (RuntimeError, ValueError, np.linalg.LinAlgError):
             continue

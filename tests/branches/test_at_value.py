@@ -78,7 +78,6 @@ def test_without_the_files_the_digits_hold_and_the_word_is_there(folder, kappa_n
                 assert abs(float(digits) - value) < 10.0 ** -len(digits.partition(".")[2])
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("law", ["ribbon", "flat rod", "isotropic rod", "finite width"])
 def test_the_preview_is_exact_where_it_says_so(law):
     """The answers of the preview come from a coarse curve; those of a curve five times finer are the same to 1e-9."""
