@@ -5,7 +5,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from branches.plot import main  # noqa: E402
+from branches.store import interrupt  # noqa: E402
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interrupt.begin("no picture was written")
+    from branches.plot import main
+
+    sys.exit(interrupt.run(main))

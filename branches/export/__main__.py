@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from branches.store.command import Parser, complain, survive_any_encoding, write_output
+from branches.store.command import Parser, Quantity, complain, survive_any_encoding, write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid command lines are answered at once
     from numpy import ndarray
@@ -47,14 +47,18 @@ def parser() -> Parser:
     )  # fmt: skip
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
     parser.add_argument(
-        "--length", type=float, metavar="X", help="length of the strip in the files (default: that of the scene in m, or 1)"
-    )
+        "--length", type=Quantity("m"), metavar="X",
+        help="length of the strip in the files, a number, or one with a unit as in 20cm, which becomes 0.2 (default: that of "
+        "the scene in m, or 1)",
+    )  # fmt: skip
     parser.add_argument(
-        "--width", type=float, metavar="X",
+        "--width", type=Quantity("m"), metavar="X",
         help="width, in the unit of --length (default: that of the scene, in proportion to the length, if it has one); the "
         "scene's width along the strip is relative to it",
     )  # fmt: skip
-    parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the unit of --length; makes a closed solid")
+    parser.add_argument(
+        "--thickness", type=Quantity("m"), metavar="X", help="thickness, in the unit of --length; makes a closed solid"
+    )
     parser.add_argument(
         "--frames", type=int, default=60, metavar="N", help="largest number of frames from end to end (default: 60)"
     )

@@ -61,11 +61,14 @@ def main(argv=None) -> int:
 def _run(options) -> int:
     from branches.scene.fields import ConfigError
     from branches.scene.parse import found, load
+    from branches.store.command import complain
     from branches.store.files import StoreError
 
     options.config = found(options.config)
     try:
         scene = load(options.config, options.set)
+        for caution in next(iter(scene.scenes.values())).cautions:
+            complain(f"caution: {caution}")
         if scene.many:
             return _run_many(scene, options)
         path = output_path(options)

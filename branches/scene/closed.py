@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, missing, show, unknown
 from branches.scene.meant import meant
-from branches.scene.units import STRIP_UNITS, quantity
+from branches.scene.units import STRIP_UNITS, quantity, unusual
 from contin.lowlevel import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, Law
 
@@ -147,6 +147,10 @@ class ClosedScene(Scene):
     @property
     def heading(self) -> str:
         return f"{self.name} on the {self.domain}"
+
+    @property
+    def cautions(self) -> list[str]:
+        return unusual(self.strip or {})
 
     # --- names of files -------------------------------------------------------------------------------------------------
 

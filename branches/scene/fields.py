@@ -153,6 +153,11 @@ class Scene(Strict):
         return self.name
 
     @property
+    def cautions(self) -> list[str]:
+        """Sentences about numbers that are allowed and look wrong."""
+        return []
+
+    @property
     def stage_count(self) -> int:
         """The number of stages."""
         return 1

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
 from branches.scene.meant import meant
-from branches.scene.units import STRIP_UNITS, quantity
+from branches.scene.units import STRIP_UNITS, quantity, unusual
 from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
@@ -369,6 +369,10 @@ class OpenScene(Scene):
             if name in (STROKE, *LOADS) and name in known:
                 numbers.setdefault(name, 0.0)
         return OpenStrip(material, *ends, numbers, *directions, *more)
+
+    @property
+    def cautions(self) -> list[str]:
+        return unusual(self.dimensions.model_dump()) if self.dimensions else []
 
     @property
     def stage_count(self) -> int:

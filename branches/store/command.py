@@ -24,6 +24,8 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, command: str, description: str, epilog: str | None = None):
         super().__init__(typed(command), allow_abbrev=False, description=description, epilog=epilog)
+        self.register("type", float, Quantity(""))
+        self.register("type", int, _whole)
 
     def parse_args(self, args=None, namespace=None):
         """Return the options; a mistyped one is named before those that are then missing."""
@@ -40,6 +42,30 @@ class Parser(argparse.ArgumentParser):
     def error(self, message):
         complain(f"error: {message} (--help shows what there is)")
         raise SystemExit(2)
+
+
+class Quantity:
+    """The type of an option that is a number in an SI unit, or has a unit."""
+
+    def __init__(self, unit: str):
+        self._unit = unit
+
+    def __call__(self, text: str) -> float:
+        """Return the number in the SI unit; raise argparse.ArgumentTypeError for a text that is none."""
+        from branches.scene.units import quantity
+
+        try:
+            return quantity(text, self._unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _whole(text: str) -> int:
+    """Return a whole number; raise argparse.ArgumentTypeError for a text that is none."""
+    try:
+        return int(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number") from error
 
 
 def survive_any_encoding() -> None:

@@ -7,14 +7,13 @@ from branches.store import interrupt
 if __name__ == "__main__":  # before the imports below, which take a second
     interrupt.begin(interrupt.NO_FILES)
 
-import argparse
 import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from branches.scene.units import STRIP_UNITS, quantity
-from branches.store.command import Parser, complain, survive_any_encoding, write_output
+from branches.scene.units import STRIP_UNITS
+from branches.store.command import Parser, Quantity, complain, survive_any_encoding, write_output
 from branches.store.files import StoreError, check_picture
 from ribbon_model.strip import Strip
 
@@ -33,10 +32,12 @@ def parser() -> Parser:
     for name, unit in STRIP_UNITS.items():
         more = "; inf for a straight strip" if name == "natural_radius" else ""
         parser.add_argument(
-            f"--{name.replace('_', '-')}", type=_Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
+            f"--{name.replace('_', '-')}", type=Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
         )
     parser.add_argument("--yield-strain", type=float, metavar="X", help="mark states with a larger strain")
-    parser.add_argument("--want", type=float, metavar="J", help="which dimensions give a stable loop with a barrier of J")
+    parser.add_argument(
+        "--want", type=Quantity("J"), metavar="J", help="which dimensions give a stable loop with a barrier of J, or 5mJ"
+    )
     parser.add_argument("--chart", metavar="FILE", help="draw the barrier over width and natural curvature (.png, .pdf, .svg)")
     parser.add_argument("--turns", type=int, metavar="M", help="turns of the loop of --want and --chart, odd (default 3)")
     parser.add_argument("--quiet", action="store_true", help="show no line of progress")
@@ -55,19 +56,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         complain(f"error: {error}")
         return 2
     return _answer(strip, asked)
-
-
-class _Quantity:
-    """The type of an option with a unit."""
-
-    def __init__(self, unit: str):
-        self._unit = unit
-
-    def __call__(self, text: str) -> float:
-        try:
-            return quantity(text, self._unit)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _check(asked: dict) -> None:

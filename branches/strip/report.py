@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from branches.scene.units import STRIP_UNITS, unusual
 from branches.strip.states import State, buckled, by_hand, circles, ways_out
 from ribbon_model.barriers import Barrier
 from ribbon_model.folding import Folding
@@ -14,11 +15,6 @@ from ribbon_model.strip import Strip
 
 #: Largest difference of thresholds for which a limit law holds, and largest ratio that counts as small.
 _AGREES, _SMALL = 0.01, 0.1
-#: Usual sizes of strips, in SI units: from a film of 100 nm to a plate of 50 mm, from a gel to graphene.
-_USUAL = (
-    ("width", 1e-5, 2.0, "m"), ("thickness", 1e-7, 0.05, "m"), ("length", 1e-4, 100.0, "m"),
-    ("natural_radius", 1e-5, 1e3, "m"), ("youngs_modulus", 1e3, 2e12, "Pa"),
-)  # fmt: skip
 
 
 # --- the law ----------------------------------------------------------------------------------------------------------
@@ -84,7 +80,7 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
 
 def assumptions(strip: Strip, rings: list[State], yield_strain: float | None = None) -> Iterator[str]:
     """Yield a caution for each assumption that fails, or whose error is not small, with its size."""
-    yield from _units(strip)
+    yield from (f"caution: {one}" for one in unusual({name: getattr(strip, name) for name in STRIP_UNITS}))
     if strip.torsion_excess > _SMALL / 2:
         ratio, excess = strip.thickness / strip.width, 100 * strip.torsion_excess
         yield f"caution: h/w = {ratio:.3g} is not thin: a plate's torsional stiffness is too large by about {excess:.0f} %"
@@ -96,14 +92,6 @@ def assumptions(strip: Strip, rings: list[State], yield_strain: float | None = N
         beyond = [ring.name for ring in rings if ring.strain > yield_strain]
         if beyond:
             yield f"caution: strains beyond the yield strain {yield_strain:g} (marked !): {', '.join(beyond)}"
-
-
-def _units(strip: Strip) -> Iterator[str]:
-    """Yield a caution for each number that looks like one in another unit."""
-    for name, least, most, unit in _USUAL:
-        value = getattr(strip, name)
-        if not least <= value <= most and math.isfinite(value):
-            yield f"caution: {name} = {value:g} {unit} is unusual ({least:g} to {most:g}); it is read in {unit}"
 
 
 def _circle_line(strip: Strip, ring: State, yield_strain) -> str:

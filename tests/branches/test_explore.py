@@ -218,7 +218,9 @@ def test_only_folds_of_stable_strips_have_a_way_down(pages, unstable_folds, resu
     """That of (1, 2) ends on the triple loop; those of (1, 3), and pages without the index or of very many files, have none."""
 
     def ways(data):
-        return [mark["way"] for family in data["families"] for one in family["branches"] for mark in one["marks"] if "way" in mark]
+        return [
+            mark["way"] for family in data["families"] for one in family["branches"] for mark in one["marks"] if "way" in mark
+        ]
 
     (way,) = ways(data_of(pages / "m1_n2.html"))
     assert [end["name"] for end in way["ends"]] == ["3-covered circle"]

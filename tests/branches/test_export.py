@@ -201,7 +201,7 @@ REFUSED = {
     "--width 0.3: must be below 0.0779": ["--point", "LP", "--out", "x.csv", "--out", "x.stl", "--width", "0.3"],
     "--thickness 0.05: must be below 0.03": ["--point", "LP", "--out", "x.stl", "--width", "0.03", "--thickness", "0.05"],
     "--frames 1: must be from 2 to 2000": ["--movie", "x.gif", "--frames", "1"],
-    "argument --width: invalid float value": ["--width", "wide"],
+    "argument --width: 'wide' must be a number (in m), or one with a unit": ["--width", "wide"],
 }
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from branches.run.__main__ import main as run_command
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
 from branches.scene.sweep import Sweep
@@ -60,6 +61,17 @@ def test_lengths_that_are_none(text, capsys):
         main(["--width", text, *OPTIONS[2:]])
     message = "must be a number (in m), or one with a unit: m, cm, mm, um or in"
     assert f"error: argument --width: {text!r} {message}" in capsys.readouterr().err
+
+
+def test_metres_with_the_numbers_of_millimetres_get_a_caution(tmp_path, call):
+    (tmp_path / "x.yaml").write_text(
+        SCENE.replace(".016", "16").replace(".6", "600").replace("2\n", "2\nsteps: {max_points: 2}\n")
+    )
+    (caution, *others) = call(run_command, "x.yaml", "--quiet").err.splitlines()
+    assert caution == "caution: width = 16 m is unusual (1e-05 to 2 m); 16 millimetres are written 16mm"
+    assert [line.split()[1] for line in others] == ["length"]
+    (tmp_path / "y.yaml").write_text(SCENE.replace("2\n", "2\nsteps: {max_points: 2}\n"))
+    assert call(run_command, "y.yaml", "--quiet").err == ""
 
 
 def test_dimensions_of_scenes_with_units():
