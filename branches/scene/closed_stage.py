@@ -230,7 +230,7 @@ def settings_of(scene: ClosedScene, events=()) -> Settings:
     """Return the engine's settings for a scene, with further test functions."""
     mesh, steps = scene.mesh, scene.steps
     # near a bifurcation that the branch leaves slowly, round-off moves solutions by this much along the kernel
-    newton = Newton(1e-8) if scene.origin else Newton()
+    newton = Newton(steps.newton_tolerance or (1e-8 if scene.origin else Newton.tolerance))
     return Settings(
         primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
         max_points=steps.max_points, angle=steps.angle, limits=scene.limits, zeros=scene.zeros, errors=True,

@@ -49,6 +49,10 @@ class StepConfig(Strict):
     largest: float = Field(10.0, gt=0, description="largest step of arclength")
     max_points: int = Field(2000, ge=1, le=1_000_000)
     angle: float = Field(0.35, gt=0.001, le=1.0, description="largest angle between consecutive tangents, radians")
+    newton_tolerance: float | None = Field(
+        None, ge=1e-14, le=1e-4,
+        description="relative error at which Newton's method stops; 1e-12, on secondary branches 1e-8",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _order(self):

@@ -17,7 +17,7 @@ from branches.scene.fields import ConfigError
 from branches.scene.labels import CONJUGATE, label_of, without_round_off
 from branches.scene.open_strip import OpenScene
 from branches.scene.stage import Stage, Watch
-from contin import ContinError, ConvergenceError, MeshControl, Point, ProblemError, Reason, Settings
+from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text, point_of
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
@@ -250,7 +250,7 @@ class OpenStage(Stage):
         return Settings(
             primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
             max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
-            zeros=zeros, mesh=_mesh_control(self.scene), events=self.strip.domain_tests(),
+            zeros=zeros, mesh=_mesh_control(self.scene), newton=_newton(self.scene), events=self.strip.domain_tests(),
             scales=self.strip.sizes(system, x),
         )  # fmt: skip
 
@@ -359,9 +359,13 @@ def first_state(scene: OpenScene) -> Point:
             intervals = strip.roller.intervals(mesh.intervals)
             if guess is not None and "roller" not in scene.numbers:  # it touches the strip where it is
                 values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
-        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene))
+        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene), newton=_newton(scene))
     except (ProblemError, ValueError) as error:
         raise ConfigError(f"begin: {scene.begin}: {error}") from error
+
+
+def _newton(scene: OpenScene) -> Newton:
+    return Newton(scene.steps.newton_tolerance or Newton.tolerance)
 
 
 def _mesh_control(scene: OpenScene) -> MeshControl:

@@ -17,6 +17,7 @@ from contin.core.settling import ROUNDS
 from contin.core.system import System
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
+from contin.names import exact_text
 from contin.problems.angles import winding_names
 from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
@@ -165,14 +166,28 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
     """
     try:
         return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, sizes=system.magnitudes)
-    except ConvergenceError:
+    except ConvergenceError as error:
         if not others:
             for place in approached(system, x):
                 with contextlib.suppress(ConvergenceError):
                     return correct(system, place, newton=newton, sizes=system.magnitudes)
         if reason := system.degenerate(x):
             raise ProblemError(reason) from None
-        raise
+        if others:
+            raise
+        raise ConvergenceError(f"{error}: {_advice(system)}") from None
+
+
+def _advice(system: System) -> str:
+    """Return what helps where no solution is found."""
+    values = dict(zip(system.problem.parameters, system.parameters))
+    held = [f"{name} = {exact_text(value)}" for name, value in values.items() if name not in system.free]
+    if not held:
+        return "give a guess closer to a solution"
+    return (
+        f"give a guess closer to a solution; if there may be none at {checks.listed(held)}, solve at other values and follow "
+        "the solution from there (trace)"
+    )
 
 
 def _check_determined(system: System, x: Array) -> None:

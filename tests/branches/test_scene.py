@@ -17,7 +17,7 @@ from branches.run.runner import run_scene
 from branches.scene.closed_stage import ClosedStage
 from branches.scene.columns import FOUND, Column, error_of
 from branches.scene.fields import ConfigError
-from branches.scene.parse import load, parse
+from branches.scene.parse import dump, load, parse
 from branches.scene.stages import stages_of
 from branches.store.read import read_branch
 from ribbon_model import laws
@@ -160,3 +160,18 @@ def test_a_law_of_ones_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_
     assert all(len(family["circles"]) == 2 for family in page["families"])
     with pytest.raises(ConfigError, match="twist"):
         parse(text.replace("twist: 1.5, ", ""), "scene")
+
+
+@pytest.mark.parametrize("name", ["m1_n2", "open_tip"])
+def test_newton_s_tolerance_is_a_field_of_scenes(name, root, tmp_path):
+    """A looser one leaves more of Newton's error in plain points, and labelled points are as good as before."""
+    largest, ends = [], []
+    for tolerance in (1e-12, 1e-7):
+        scene = load(root / "configs" / f"{name}.yaml", [f"steps.newton_tolerance={tolerance}"])
+        assert parse(dump(scene), "again") == scene
+        run_scene(scene, tmp_path / "x.h5", Display(silent=True), overwrite=True)
+        branch = read_branch(tmp_path / "x.h5")
+        largest.append(branch.points["newton_error"].max())
+        ends.append(branch.events["energy"])
+    assert largest[0] <= 1e-12 < largest[1] <= 1e-7
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)

@@ -68,6 +68,15 @@ def test_bad_first_guesses(guess, options, said):
         solve(bratu(), guess, **options)
 
 
+def test_where_newton_fails_the_sentence_says_what_helps():
+    """Bratu's problem has no solution above lam = 3.5138; the advice works where it has one."""
+    with pytest.raises(ConvergenceError, match="give a guess closer to a solution; if there may be none at lam = 5, solve at"):
+        solve(bratu(), [0, 0], {"lam": 5.0})
+    known = solve(bratu(), [0, 0], {"lam": 1.0})
+    followed = trace(known, free=["lam"], zeros={"lam": [3.0]}, limits={"lam": (0, 4)}).labelled("UZ")
+    assert [middle(point) for point in followed] == pytest.approx(bratu_middles(3.0), abs=1e-9)
+
+
 # --- deflation ------------------------------------------------------------------------------------------------------
 
 
