@@ -48,8 +48,9 @@ _TYPE, _DATA, _DIMENSIONS, _SHAPE, _NUMBERS, _FLAGS = _HEAD - 8, _HEAD, _HEAD + 
 #: In a type of numbers (PyArray_Descr), behind its head: the class, three letters of which the last is the order of bytes, a
 #: letter, and the number of the type.
 _ORDER, _NUMBER = _HEAD + 10, _HEAD + 12
-#: The first entry of a tuple, behind its head and its size.
-_ENTRIES = tuple.__basicsize__
+#: In a type, behind its head and its length and the address of its name: the size of its objects. The entries of a tuple begin
+#: behind that, which versions of Python have in several places.
+_BASIC_SIZE = _HEAD + 16
 #: Flags of an array: contiguous rows, aligned; and writable.
 _CONTIGUOUS, _WRITABLE = 0x0001 | 0x0100, 0x0400
 
@@ -154,11 +155,8 @@ def _resolved(function: Any, context: Any, arguments: Any, names: Any) -> Any:
 @functools.cache
 def _target() -> Any:
     """Return LLVM's description of the processor that machine code is made for."""
-    triple, processor = machine()
-    reloc = "static" if triple.startswith("x86") else "default"  # as numba for code that this process runs
-    return llvm.Target.from_triple(triple).create_target_machine(
-        cpu=processor, opt=3, reloc=reloc, codemodel="jitdefault", jit=True
-    )
+    triple, processor = llvm.get_default_triple(), machine()[1]
+    return llvm.Target.from_triple(triple).create_target_machine(cpu=processor, opt=3, reloc="pic", codemodel="default")
 
 
 class _Library(JITCodeLibrary):
@@ -369,6 +367,9 @@ class _Entry:
         for function in module.functions:
             if not function.is_declaration and function.name not in (self.name, self.name + INNER):
                 function.linkage = "internal"
+        for variable in module.global_variables:
+            if not variable.is_declaration:
+                variable.linkage = "internal"
         foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         foreign += [v.name for v in module.global_variables if v.is_declaration]
         own = next((name for name in foreign if name.startswith(_NUMBAS)), None)
@@ -401,7 +402,7 @@ class _Entry:
         if isinstance(kind, types.Array):
             return self._array(kind, given)
         if isinstance(kind, types.BaseTuple):
-            entries = builder.bitcast(_step(builder, given, _ENTRIES), _POINTER.as_pointer())
+            entries = self._entries(given)
             values = [self._value(field, builder.load(_step(builder, entries, i))) for i, field in enumerate(_fields(hint))]
             return self.context.make_tuple(builder, kind, values)
         whole = isinstance(kind, types.Integer)
@@ -444,7 +445,13 @@ class _Entry:
 
     def _own(self, place: int) -> Any:
         """Return an entry of the tuple ``self``."""
-        return _field(self.builder, self.function.args[0], _ENTRIES + 8 * place, _POINTER)
+        return self.builder.load(_step(self.builder, self._entries(self.function.args[0]), place))
+
+    def _entries(self, given: ir.Value) -> Any:
+        """Return the address of the entries of a tuple."""
+        builder = self.builder
+        size = _field(builder, _field(builder, given, _TYPE, _POINTER), _BASIC_SIZE, _WORD)
+        return builder.bitcast(builder.gep(given, [size]), _POINTER.as_pointer())
 
     def _require(self, condition: ir.Value) -> None:
         """Go on where a condition holds."""

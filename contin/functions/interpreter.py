@@ -15,10 +15,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
 
 from contin.arrays import Array
 from contin.functions import round_off
@@ -29,14 +28,21 @@ from contin.functions.kernel_parts import (
     Matrix,
     Stack,
     Vector,
+    constant,
+    double,
     for_range,
     helper,
     instruction,
+    llvm,
     variable,
+    whole,
 )
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, Inputs, Program, program
 from contin.functions.tape import Tape
+
+if TYPE_CHECKING:
+    from llvmlite import ir
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
 #: twice as often.
@@ -44,12 +50,6 @@ LANES = 32
 #: Numbers that arithmetic takes together: a vector register of AVX-512.
 _GROUP = 8
 
-#: LLVM's type of floating-point numbers.
-_DOUBLE = ir.DoubleType()
-#: LLVM's type of whole numbers.
-_WORD = ir.IntType(64)
-#: LLVM's type of a group.
-_VECTOR = ir.VectorType(_DOUBLE, _GROUP)
 #: Bytes of a register.
 _REGISTER = 8 * LANES
 #: Bytes of a group.
@@ -99,8 +99,8 @@ class _Writer:
     def entry(self, base: ir.Value, number: ir.Value) -> Any:
         return self.builder.add(base, self.builder.mul(number, _number(8)))
 
-    def load(self, address: ir.Value, kind: ir.Type = _DOUBLE) -> Any:
-        value = self.builder.load(self.builder.inttoptr(address, kind.as_pointer()))
+    def load(self, address: ir.Value, kind: ir.Type | None = None) -> Any:
+        value = self.builder.load(self.builder.inttoptr(address, (kind or double()).as_pointer()))
         value.align = 8
         return value
 
@@ -111,9 +111,9 @@ class _Writer:
         return self.load(self.entry(self.memory.scalars, number))
 
     def splat(self, value: ir.Value) -> Any:
-        none = ir.Constant(_VECTOR, ir.Undefined)
-        first = self.builder.insert_element(none, value, ir.Constant(ir.IntType(32), 0))
-        return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(ir.IntType(32), _GROUP), [0] * _GROUP))
+        none = constant(_group(), llvm().Undefined)
+        first = self.builder.insert_element(none, value, constant(whole(32), 0))
+        return self.builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), _GROUP), [0] * _GROUP))
 
     def vector(self, value: Callable[..., Any], operands: list[Any], scalars: list[Any]) -> None:
         """d = value(operands, scalars), eight lanes at a time; scalars are the same in all."""
@@ -122,7 +122,7 @@ class _Writer:
         wide = [self.splat(self.scalar(number)) for number in scalars]
         with for_range(builder, self.groups) as loop:
             offset = builder.mul(loop.index, _number(_BYTES))
-            values = [self.load(builder.add(source, offset), _VECTOR) for source in sources]
+            values = [self.load(builder.add(source, offset), _group()) for source in sources]
             self.store(value(*values, *wide), builder.add(target, offset))
 
     def each(self, value: Callable[..., Any], operands: list[Any]) -> None:
@@ -164,33 +164,39 @@ class _Writer:
 
     def listed(self, number: ir.Value) -> Any:
         """Return a number of the list that begins at a."""
-        return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), _WORD)
+        return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), whole())
 
     def lane(self, register: ir.Value, offset: ir.Value) -> Any:
         """Return eight lanes of a register."""
-        return self.load(self.builder.add(self.register(register), offset), _VECTOR)
+        return self.load(self.builder.add(self.register(register), offset), _group())
+
+
+def _group() -> Any:
+    """Return LLVM's type of a group."""
+    return llvm().VectorType(double(), _GROUP)
 
 
 def _number(value: int) -> Any:
-    return ir.Constant(_WORD, value)
+    return constant(whole(), value)
 
 
 def _intrinsic(builder: ir.IRBuilder, name: str) -> Callable[[Any], Any]:
     full = f"llvm.{name}.v{_GROUP}f64"
-    function = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), full)
+    kind = llvm().FunctionType(_group(), [_group()])
+    function = builder.module.globals.get(full) or llvm().Function(builder.module, kind, full)
     return lambda x: builder.call(function, [x])
 
 
 def _truth(builder: ir.IRBuilder, condition: ir.Value) -> Any:
-    return builder.uitofp(condition, _VECTOR)
+    return builder.uitofp(condition, _group())
 
 
 def _zeros() -> Any:
-    return ir.Constant(_VECTOR, [0.0] * _GROUP)
+    return constant(_group(), [0.0] * _GROUP)
 
 
 def _sign(builder: ir.IRBuilder, x: ir.Value) -> Any:
-    one, minus = (ir.Constant(_VECTOR, [value] * _GROUP) for value in (1.0, -1.0))
+    one, minus = (constant(_group(), [value] * _GROUP) for value in (1.0, -1.0))
     below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
     return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
 
@@ -226,15 +232,15 @@ def _arithmetic(builder: ir.IRBuilder) -> dict[str, tuple[Callable[..., Any], in
 def _library(builder: ir.IRBuilder, name: str) -> tuple[Callable[..., Any], int]:
     """Return the value of a function of the C library for one lane, and the number of its operands."""
     external, count = TABLE[name].external, 2 if name in OF_TWO else 1
-    kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * count)
-    function = builder.module.globals.get(external) or ir.Function(builder.module, kind, external)
+    kind = llvm().FunctionType(double(), [double()] * count)
+    function = builder.module.globals.get(external) or llvm().Function(builder.module, kind, external)
 
     def value(*given: ir.Value) -> Any:
         found = builder.call(function, given)
         if name != "mod":
             return found
         x, y = found, given[1]  # C's remainder has the sign of the dividend, Python's that of the divisor
-        zero = ir.Constant(_DOUBLE, 0.0)
+        zero = constant(double(), 0.0)
         other = builder.fcmp_ordered("<", builder.fmul(x, y), zero)
         return builder.select(other, builder.fadd(x, y), x)
 
@@ -288,7 +294,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
 
 
 @instruction
-def interpret(builder: ir.IRBuilder, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
+def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
     """Run the instructions from ``first`` to ``last``; return the number of one that is none of these, or ``last``."""
     write = _Writer(builder, memory, widths, lanes)
     place = variable(builder, first)
@@ -299,7 +305,9 @@ def interpret(builder: ir.IRBuilder, memory: Memory, widths: Widths, lanes: int,
     builder.cbranch(builder.icmp_signed("<", now, last), body, end)
     builder.position_at_end(body)
     row = builder.add(memory.code, builder.mul(now, _number(_ROW)))
-    code, write.d, write.a, write.b, write.c = (write.load(builder.add(row, _number(8 * column)), _WORD) for column in range(5))
+    code, write.d, write.a, write.b, write.c = (
+        write.load(builder.add(row, _number(8 * column)), whole()) for column in range(5)
+    )
     following = builder.append_basic_block()
     choice = builder.switch(code, end)
     for name, case in _cases(write).items():
@@ -476,7 +484,7 @@ def _give_up(work, lists, row, lanes):
 
 
 @instruction
-def _address(builder: ir.IRBuilder, array: Any, offset: int) -> int:
+def _address(builder: Any, array: Any, offset: int) -> int:
     """Return an address in an array."""
     there: int = builder.add(array.address, offset)
     return there
@@ -559,13 +567,13 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 
 @instruction
-def _bits(builder: ir.IRBuilder, value: float) -> int:
-    return builder.bitcast(value, _WORD)  # type: ignore[no-any-return]
+def _bits(builder: Any, value: float) -> int:
+    return builder.bitcast(value, whole())  # type: ignore[no-any-return]
 
 
 @instruction
-def _number_of(builder: ir.IRBuilder, bits: int) -> float:
-    return builder.bitcast(bits, _DOUBLE)  # type: ignore[no-any-return]
+def _number_of(builder: Any, bits: int) -> float:
+    return builder.bitcast(bits, double())  # type: ignore[no-any-return]
 
 
 @helper

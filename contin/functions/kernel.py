@@ -26,7 +26,6 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
-import llvmlite
 import numpy as np
 
 from contin import threads
@@ -70,19 +69,22 @@ class Kernel:
         return frozenset(files.union(*(part.files for part in used if isinstance(part, Kernel))))
 
     @functools.cached_property
-    def key(self) -> str:
-        """The name of its machine code in the cache: a fingerprint of all that the code depends on."""
+    def entry(self) -> str:
+        """The name of the function that its machine code holds for Python: a fingerprint of what it is made of."""
         numbers = [part for part in self.parts if isinstance(part, int | float)]
         held = sorted(map(contents, self.files))
-        return hashlib.sha256(repr((self.name, self.reorder, numbers, held, *_surroundings())).encode()).hexdigest()[:32]
+        return machine_code.ENTRY + _fingerprint(self.name, self.reorder, numbers, held, _made_by(), object.__basicsize__)
 
-    @property
-    def entry(self) -> str:
-        """The name of the function that its machine code holds for Python."""
-        return machine_code.ENTRY + self.key
+    @functools.cached_property
+    def key(self) -> str:
+        """The name of its machine code in the cache: a fingerprint of all that the code depends on."""
+        return _fingerprint(self.entry, *_surroundings())
 
     def stored(self) -> Callable[..., Any] | None:
-        """Return the function that runs the machine code in the cache; None where there is none that can be used."""
+        """Return the function that runs the machine code that came with the package or is in the cache; None without any."""
+        shipped = machine_code.shipped(self.entry, self.name, self.function.__doc__)
+        if shipped is not None or not _has_compiler():
+            return shipped
         code = machine_code.stored(self.key)
         with contextlib.suppress(ContinError):  # a kernel that it calls may not be in the cache
             return machine_code.loaded(code, self.name, self.function.__doc__) if code else None
@@ -91,6 +93,11 @@ class Kernel:
     @functools.cached_property
     def compiled(self) -> Callable[..., Any]:
         """The function that runs the machine code; that of the kernels that it calls is loaded before."""
+        shipped = machine_code.shipped(self.entry, self.name, self.function.__doc__)
+        if shipped is not None:
+            return shipped
+        if not _has_compiler():
+            raise ContinError(_NO_COMPILER)
         code = self.code
         for part in parts(self.function):
             if isinstance(part, Kernel) and part is not self:
@@ -230,15 +237,39 @@ def contents(*files: Path) -> str:
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
+def _fingerprint(*parts: Any) -> str:
+    """Return a fingerprint of what has a fixed representation."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+
+
 #: Files that decide what machine code is made of, besides the `Kernel.files`.
 _MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", "program")
 
 
 @functools.cache
+def _made_by() -> str:
+    """Return a fingerprint of the engine's files that kernels and compiler consist of."""
+    return contents(*(Path(__file__).with_name(f"{name}.py") for name in _MADE_BY))
+
+
+@functools.cache
 def _surroundings() -> tuple[str, ...]:
-    """Return what all machine code depends on: the engine's files that kernels and compiler consist of, and the machine."""
-    here = Path(__file__).parent
-    files = [here / f"{name}.py" for name in _MADE_BY]
+    """Return what machine code depends on besides its source: the compiler, the libraries, and the machine."""
+    import llvmlite
+
     numba = importlib.util.find_spec("numba")  # its version stands in a file; to ask for it would take 20 ms
     release = contents(Path(str(numba.origin)).with_name("_version.py")) if numba is not None else ""
-    return contents(*files), sys.version, release, llvmlite.__version__, np.__version__, *machine_code.machine()
+    return sys.version, release, llvmlite.__version__, np.__version__, *machine_code.machine()
+
+
+@functools.cache
+def _has_compiler() -> bool:
+    """Return whether numba is installed, with which machine code is made."""
+    return importlib.util.find_spec("numba") is not None
+
+
+#: Without numba, where a kernel is wanted that the package's library does not have.
+_NO_COMPILER = (
+    "contin: no machine code for this machine and this version of Python came with the package, and numba, which makes it, "
+    "is not installed: pip install numba"
+)

@@ -154,6 +154,28 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
     return written  # type: ignore[no-any-return]
 
 
+def llvm() -> Any:
+    """Return LLVM's language, in which instructions are written; only the compiler needs it."""
+    from llvmlite import ir
+
+    return ir
+
+
+def double() -> Any:
+    """Return LLVM's type of floating-point numbers."""
+    return llvm().DoubleType()
+
+
+def whole(bits: int = 64) -> Any:
+    """Return LLVM's type of whole numbers."""
+    return llvm().IntType(bits)
+
+
+def constant(kind: Any, value: Any) -> Any:
+    """Return a constant of LLVM's language."""
+    return llvm().Constant(kind, value)
+
+
 class Place:
     """An array of any kind, as an instruction sees it: the address of its first entry, and the bytes from one to the next."""
 

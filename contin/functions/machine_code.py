@@ -1,7 +1,8 @@
 """Machine code on disk, and in memory as Python functions, without a compiler.
 
-The code of a kernel is an object file for this machine. It holds a function that Python calls like one of its own: it checks
-its arguments, reads the addresses and shapes of arrays, and calls the kernel. `contin.functions.compiler` writes it.
+The code of a kernel is an object file. It holds a function that Python calls like one of its own: it checks its arguments,
+reads the addresses and shapes of arrays, and calls the kernel. `contin.functions.compiler` writes it. Wheels bring these files
+linked to a shared library; what is not in there is made where it is wanted, and kept in the cache.
 
 A file in the cache is used only where it is whole, of the wanted key, and finds all functions of other libraries that it calls.
 The cache can only help: a file that cannot be read, written or trusted costs time, never an answer.
@@ -14,11 +15,13 @@ import ctypes
 import functools
 import hashlib
 import json
+import os
+import platform
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
-import llvmlite.binding as llvm
 import numpy as np
 
 from contin.errors import ContinError
@@ -49,18 +52,58 @@ def machine() -> tuple[str, str]:
 
     The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3
     (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one elsewhere.
+    ``CONTIN_PROCESSOR`` names another one.
     """
-    triple = llvm.get_default_triple()
-    if not triple.startswith("x86_64"):
-        return triple, "generic"
-    features = llvm.get_host_cpu_features()
-    return triple, "x86-64-v3" if all(features.get(name) for name in _VERSION_3) else "x86-64"
+    kind = platform.machine().lower()
+    here = "generic"
+    if kind in ("x86_64", "amd64"):
+        here = "x86-64-v3" if _features() >= _VERSION_3 else "x86-64"
+    return f"{sys.platform}-{kind}", os.environ.get("CONTIN_PROCESSOR") or here
 
 
-#: What LLVM calls the features that x86-64-v3 has and x86-64 has not.
-_VERSION_3 = (
-    "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "ssse3", "cx16", "sahf", "xsave",
-)  # fmt: skip
+def _features() -> set[str]:
+    """Return what this processor has, by the names of Linux; nothing where the system is another one and LLVM is not there."""
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
+        return set(next(line for line in lines if line.startswith("flags")).split())
+    with contextlib.suppress(ImportError):
+        found = _llvm().get_host_cpu_features()
+        return {_LINUX.get(name, name) for name in found if found[name]}
+    return set()
+
+
+#: The features that x86-64-v3 has and x86-64 has not.
+_VERSION_3 = {
+    "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "popcnt", "sse4_2", "ssse3", "cx16", "lahf_lm", "xsave",
+}  # fmt: skip
+#: LLVM's names of features that have other ones in Linux.
+_LINUX = {"bmi": "bmi1", "lzcnt": "abm", "sse4.2": "sse4_2", "sahf": "lahf_lm"}
+
+
+def _llvm() -> Any:
+    """Return the library that loads object files; a wheel's machine code needs none."""
+    import llvmlite.binding
+
+    return llvmlite.binding
+
+
+def shipped(entry: str, name: str, doc: str | None) -> Callable[..., Any] | None:
+    """Return a function from the library that came with the package; None where that does not have it."""
+    found = getattr(_library(), entry, None)
+    return None if found is None else _called(ctypes.cast(found, ctypes.c_void_p).value, name, doc)
+
+
+@functools.cache
+def _library() -> ctypes.CDLL | None:
+    """Return the library of machine code that came with the package, None where none runs here."""
+    path = Path(__file__).with_name(f"{LIBRARY}{machine()[1]}.so")
+    with contextlib.suppress(OSError):
+        return ctypes.CDLL(str(path), ctypes.RTLD_GLOBAL)  # kernels that are made later may call those in it
+    return None
+
+
+#: The name of a library of machine code, followed by the processor.
+LIBRARY = "kernels-"
 
 
 def stored(key: str) -> Code | None:
@@ -77,7 +120,7 @@ def _missing(code: Code, kernels: bool) -> list[str]:
     """Return functions that a code calls and that this process does not have; other ``kernels`` may be loaded later."""
     _engine()  # loads the functions of this process
     names = [name for name in code.foreign if kernels or not name.startswith(ENTRY)]
-    return [name for name in names if llvm.address_of_symbol(name) is None]
+    return [name for name in names if _llvm().address_of_symbol(name) is None]
 
 
 def keep(key: str, code: Code) -> None:
@@ -148,11 +191,16 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
     missing = _missing(code, kernels=True)
     if missing:
         raise ContinError(f"{name}: the function {missing[0]}, which its machine code calls, is not there")
-    engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code.object))
+    engine.add_object_file(_llvm().object_file.ObjectFileRef.from_data(code.object))
     engine.finalize_object()
-    llvm.add_symbol(code.entry + INNER, engine.get_function_address(code.entry + INNER))
+    _llvm().add_symbol(code.entry + INNER, engine.get_function_address(code.entry + INNER))
+    return _called(engine.get_function_address(code.entry), name, doc)
+
+
+def _called(address: int | None, name: str, doc: str | None) -> Callable[..., Any]:
+    """Return the function at an address as a Python function."""
     module, _, own = name.rpartition(".")
-    method = _Method(own.encode(), engine.get_function_address(code.entry), _CALLED_WITH_ARRAY, (doc or "").encode())
+    method = _Method(own.encode(), address, _CALLED_WITH_ARRAY, (doc or "").encode())
     _KEPT.append(method)
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype, make.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
@@ -163,6 +211,7 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
 @functools.cache
 def _engine() -> Any:
     """Return the loader of object files."""
+    llvm = _llvm()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_default_triple().create_target_machine()

@@ -14,12 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from llvmlite import ir
+from contin.functions.kernel_parts import constant, double, for_range, instruction, llvm, variable, whole
 
-from contin.functions.kernel_parts import for_range, instruction, variable
-
-# LLVM's types of numbers.
-_DOUBLE, _WORD, _INT32, _BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)
 #: Columns that are updated at a time: a vector register of AVX-512. From 4 to 64 all matrices take the same time.
 _WIDTH = 8
 #: Columns that are eliminated together, and rows that are updated together. With 2 elimination takes 1.2 times as long, with 8
@@ -142,19 +138,19 @@ def reduce_column(builder: Any, pivot: Rows, count: int, column: int, size: int)
     take the place of the ``column``. Return the index, from 0, of the row below the pivot row that has the largest entry in
     the next column.
     """
-    vector = ir.VectorType(_DOUBLE, PANEL)
-    lanes = ir.Constant(ir.VectorType(_WORD, PANEL), list(range(PANEL)))
+    vector = llvm().VectorType(double(), PANEL)
+    lanes = constant(llvm().VectorType(whole(), PANEL), list(range(PANEL)))
     here = builder.icmp_signed("==", lanes, _splat(builder, column, PANEL))
     right = builder.icmp_signed(">", lanes, _splat(builder, column, PANEL))
     right = builder.and_(right, builder.icmp_signed("<", lanes, _splat(builder, size, PANEL)))
-    upper = builder.select(right, _load(builder, pivot.address, PANEL), ir.Constant(vector, [0.0] * PANEL))
+    upper = builder.select(right, _load(builder, pivot.address, PANEL), constant(vector, [0.0] * PANEL))
     at_column = builder.mul(column, _number(8))
     last = builder.icmp_signed(">=", builder.add(column, _number(1)), size)
     at_next = builder.select(last, at_column, builder.add(at_column, _number(8)))
     divisor = _load(builder, builder.add(pivot.address, at_column))
     following = _load(builder, builder.add(pivot.address, at_next))
-    absolute = builder.module.declare_intrinsic("llvm.fabs", [_DOUBLE])
-    best, where = variable(builder, ir.Constant(_DOUBLE, -1.0)), variable(builder, _number(0))
+    absolute = builder.module.declare_intrinsic("llvm.fabs", [double()])
+    best, where = variable(builder, constant(double(), -1.0)), variable(builder, _number(0))
     row = variable(builder, builder.add(pivot.address, pivot.stride))
     with for_range(builder, count) as loop:
         address = builder.load(row)
@@ -192,7 +188,7 @@ def invert_triangles(builder: Any, block: Rows, count: int) -> None:
             return total
 
         for c in range(size):
-            new[c, c] = builder.fdiv(ir.Constant(_DOUBLE, 1.0), old[c][c])
+            new[c, c] = builder.fdiv(constant(double(), 1.0), old[c][c])
             for r in range(c):
                 new[r, c] = builder.fneg(builder.fmul(product(r, c, range(r, c), None), new[c, c]))
         for c in range(size):
@@ -212,13 +208,13 @@ def multiply_rows(builder: Any, rows: Rows, number: int, block: Rows, count: int
     """
 
     def write(size: int) -> None:
-        vector, bits = ir.VectorType(_DOUBLE, PANEL), ir.VectorType(_BIT, PANEL)
-        zero = ir.Constant(vector, [0.0] * PANEL)
+        vector, bits = llvm().VectorType(double(), PANEL), llvm().VectorType(whole(1), PANEL)
+        zero = constant(vector, [0.0] * PANEL)
         upper = []
         for r, address in enumerate(_rows(builder, block, size)):
-            mask = ir.Constant(bits, [int(r <= c < size) for c in range(PANEL)])
+            mask = constant(bits, [int(r <= c < size) for c in range(PANEL)])
             upper.append(builder.select(mask, _load(builder, address, PANEL), zero))
-        inside = ir.Constant(bits, [int(c < size) for c in range(PANEL)])
+        inside = constant(bits, [int(c < size) for c in range(PANEL)])
         with for_range(builder, number) as loop:
             row = _below(builder, rows, loop.index).address
             old, total = _load(builder, row, PANEL), None
@@ -274,7 +270,7 @@ def subtract_rows(builder: Any, target: int, matrix: Rows, vectors: int, length:
 
     def subtract(first: Any, together: int) -> None:
         ours = _rows(builder, _below(builder, matrix, first), together)
-        zero = ir.Constant(ir.VectorType(_DOUBLE, LANES), [0.0] * LANES)
+        zero = constant(llvm().VectorType(double(), LANES), [0.0] * LANES)
         totals = [[variable(builder, zero) for _ in ours] for _ in range(2)]  # two sums, so that one need not wait
 
         def add(j: Any, places: list[Any]) -> None:
@@ -375,7 +371,7 @@ def add(builder: Any, target: int, source: int) -> None:
 @instruction
 def clear(builder: Any, target: int) -> None:
     """Make one entry zero."""
-    _store(builder, ir.Constant(ir.VectorType(_DOUBLE, LANES), [0.0] * LANES), target)
+    _store(builder, constant(llvm().VectorType(double(), LANES), [0.0] * LANES), target)
 
 
 @instruction
@@ -386,10 +382,10 @@ def side_by_side(builder: Any, target: int, source: Rows, length: int, rows: int
         there = builder.icmp_unsigned("<", _number(lane), rows)
         places.append(builder.select(there, builder.add(places[-1], source.stride), places[-1]))
     with for_range(builder, length) as loop:
-        entry = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+        entry = constant(llvm().VectorType(double(), LANES), llvm().Undefined)
         for lane, place in enumerate(places):
             value = _load(builder, builder.add(place, builder.mul(loop.index, _number(8))))
-            entry = builder.insert_element(entry, value, ir.Constant(_INT32, lane))
+            entry = builder.insert_element(entry, value, constant(whole(32), lane))
         _store(builder, entry, _entry(builder, target, loop.index))
 
 
@@ -402,7 +398,7 @@ def apart(builder: Any, target: Rows, source: int, length: int, rows: int) -> No
         with for_range(builder, length) as loop:
             entry = _load(builder, _entry(builder, source, loop.index), LANES)
             for lane, place in enumerate(places):
-                value = builder.extract_element(entry, ir.Constant(_INT32, lane))
+                value = builder.extract_element(entry, constant(whole(32), lane))
                 _store(builder, value, builder.add(place, builder.mul(loop.index, _number(8))))
 
     fewer = builder.icmp_unsigned("<", rows, _number(LANES))
@@ -414,7 +410,7 @@ def apart(builder: Any, target: Rows, source: int, length: int, rows: int) -> No
 
 def _number(value: int) -> Any:
     """Return a constant of the machine's integers."""
-    return ir.Constant(_WORD, value)
+    return constant(whole(), value)
 
 
 def _below(builder: Any, rows: Rows, first: Any) -> Rows:
@@ -445,7 +441,7 @@ def _entry(builder: Any, vectors: Any, index: Any) -> Any:
 
 def _load(builder: Any, address: Any, width: int = 0) -> Any:
     """Return the number at an address, or the vector of ``width`` numbers."""
-    kind = ir.VectorType(_DOUBLE, width) if width else _DOUBLE
+    kind = llvm().VectorType(double(), width) if width else double()
     value = builder.load(builder.inttoptr(address, kind.as_pointer()))
     value.align = 8
     return value
@@ -458,9 +454,9 @@ def _store(builder: Any, value: Any, address: Any) -> None:
 
 def _splat(builder: Any, value: Any, width: int) -> Any:
     """Return a vector with the same value in all places."""
-    none = ir.Constant(ir.VectorType(value.type, width), ir.Undefined)
-    first = builder.insert_element(none, value, ir.Constant(_INT32, 0))
-    return builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(_INT32, width), [0] * width))
+    none = constant(llvm().VectorType(value.type, width), llvm().Undefined)
+    first = builder.insert_element(none, value, constant(whole(32), 0))
+    return builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), width), [0] * width))
 
 
 def _plus(builder: Any, total: Any, factor: Any, vector: Any) -> Any:

@@ -1,7 +1,10 @@
 """Compiled code on disk: whatever state the files are in, and wherever they may not be, the answer is right."""
 
+import ctypes
 import errno
 import os
+import platform
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -128,7 +131,7 @@ def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
     """A cache may lie in a home that several machines share. Processors that run the same code share it."""
     keys = {Kernel(_twice, reorder=True).key}
     for target, name, value in (
-        (machine_code.llvm, "get_host_cpu_features", dict), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
+        (machine_code, "_features", set), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
     ):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setattr(target, name, value)
@@ -140,10 +143,49 @@ def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
 
 def test_the_code_does_not_depend_on_the_processor(monkeypatch):
     """Kernels give the same bits on processors with AVX2: they are compiled for x86-64-v3, not for the host."""
-    here = machine_code.machine()
-    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_name", lambda: "sapphirerapids")
-    assert machine_code.machine() == here
-    assert here[1] in ("x86-64-v3", "x86-64", "generic")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    for features, processor in (
+        (machine_code._VERSION_3, "x86-64-v3"), ({*machine_code._VERSION_3, "avx512f"}, "x86-64-v3"), ({"avx2"}, "x86-64"),
+    ):  # fmt: skip
+        monkeypatch.setattr(machine_code, "_features", lambda features=features: features)
+        assert machine_code.machine()[1] == processor
+
+
+@pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="Linux tells what the processor has")
+def test_linux_and_llvm_tell_the_same_of_the_processor(monkeypatch):
+    told = machine_code._features()
+    monkeypatch.setattr(Path, "read_text", lambda *_, **__: "")
+    assert machine_code._VERSION_3 & machine_code._features() == machine_code._VERSION_3 & told
+
+
+@pytest.fixture
+def library(kernel, tmp_path, monkeypatch):
+    """A library, as wheels have it, with the machine code of the kernel; nothing is in the cache."""
+    linker = shutil.which("cc")
+    if linker is None or sys.platform != "linux":
+        pytest.skip("no compiler to link with, or not Linux")
+    (tmp_path / "one.o").write_bytes(kernel().code.object)
+    subprocess.run([linker, "-shared", "-o", str(tmp_path / "one.so"), str(tmp_path / "one.o")], check=True)
+    _file(tmp_path).unlink()
+    found = ctypes.CDLL(str(tmp_path / "one.so"), ctypes.RTLD_GLOBAL)
+    monkeypatch.setattr(machine_code, "_library", lambda: found)
+
+
+def test_machine_code_that_comes_with_the_package_needs_no_compiler(library, kernel, tmp_path, monkeypatch):
+    monkeypatch.setattr(kernels, "_has_compiler", lambda: False)
+    found = kernel().stored()
+    assert found(X, 2) == kernel()(X, 2) == 12.0
+    assert found.__name__ == "_twice" and found.__doc__ == "Double the sum."
+    assert not list(tmp_path.glob("k*.bin"))
+
+
+def test_code_of_another_source_is_not_taken_from_the_package(library, monkeypatch):
+    other = Kernel(_twice, reorder=False)
+    assert other.stored() is None
+    assert other(X, 2) == 12.0
+    monkeypatch.setattr(kernels, "_has_compiler", lambda: False)
+    with pytest.raises(ContinError, match="numba, which makes it, is not installed: pip install numba"):
+        Kernel(_flat, reorder=True)(np.eye(2))
 
 
 @pytest.mark.parametrize(
