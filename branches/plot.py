@@ -33,6 +33,11 @@ def parser() -> Parser:
         help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, or 0.3); "
         "narrower where its generators would cross",
     )  # fmt: skip
+    of_branch.add_argument(
+        "--view", nargs=2, type=float, metavar=("AZIMUTH", "ELEVATION"),
+        help="the side from which strips are seen, in degrees (default: open strips from the side, -90 20, a horizontal strip "
+        "is horizontal; closed ones at an angle, -45 32)",
+    )  # fmt: skip
     diagram = parser.add_argument_group("a diagram")
     diagram.add_argument("--window", nargs=2, type=float, default=(-8.0, 14.0), metavar=("LOW", "HIGH"), help="of kappa_n")
     diagram.add_argument("--law", help="which law, where the diagram has several")
@@ -76,7 +81,7 @@ def _branch(options, path: Path):
 
     def figure():
         axes = {name: column for name, column in (("x", options.x), ("y", options.y)) if column}
-        return read_branch(path).plot(options.shapes, options.width, **axes)
+        return read_branch(path).plot(options.shapes, options.width, view=options.view, **axes)
 
     return figure, out, ""
 

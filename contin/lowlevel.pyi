@@ -16,13 +16,15 @@ from .functions.gradient import gradient
 from .functions.iteration import least, minimum, root
 from .linalg.orientation import eigenbasis
 from .names import exact_text
+from .results.colours import PALETTE, Colour
 from .results.columns import StoredColumns, read_columns
+from .results.cubic import hermite, through
 from .results.point import point_of
 from .search.trace import follow
 
 __all__ = [
-    "Algebraic", "Batch", "BranchPoint", "Collocation", "Continuation", "MultiplePoint", "State", "Stop", "StoredColumns",
-    "Trial", "basis", "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "gradient",
-    "interpolation", "least", "locate_branch_point", "minimum", "point_of", "read_columns", "root", "temporary_name",
-    "write_whole",
+    "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE", "State", "Stop",
+    "StoredColumns", "Trial", "basis", "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "gradient",
+    "hermite", "interpolation", "least", "locate_branch_point", "minimum", "point_of", "read_columns", "root", "temporary_name",
+    "through", "write_whole",
 ]  # fmt: skip

@@ -410,7 +410,10 @@ class OpenStrip(Shown):
     # --- what a state is ----------------------------------------------------------------------------------------------
 
     def reactions(self, point: Point) -> dict[str, float]:
-        """Return the force and the moment on the strip at the last end, then at the first one, on the lab axes."""
+        """Return the force and the moment on the strip at the last end, then at the first one, on the lab axes.
+
+        With a roller or a stroke, the force of the roller and the force at the last end along the stroke follow.
+        """
         return self.reactions_of(point.system.states(point.x))
 
     def reactions_of(self, states: np.ndarray) -> dict[str, float]:
@@ -423,7 +426,11 @@ class OpenStrip(Shown):
             q, lam = row[:4], row[n : n + 7]
             values += [*(sign * (lam[4:7] + more)), *(sign * moment_on_axes(q, lam[:4]))]
         found = dict(zip(REACTIONS, map(float, values)))
-        return found if self.roller is None else {**found, "F_roller": roller}
+        if self.roller is not None:
+            found["F_roller"] = roller
+        if STROKE in self.numbers:
+            found["F_stroke"] = float(np.dot(values[:3], self.stroke_direction))
+        return found
 
     def potential(self, point: Point) -> float:
         """Return the energy with the potential of the dead loads at the last end: that of which the index is."""

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
-from branches.draw.strip import draw_strip, reach_of
-from branches.draw.style import LINES, in_words, smooth
+from branches.draw.strip import View, draw_strip, reach_of
+from branches.draw.style import LINES, OTHER, UNKNOWN, in_words, smooth
 
 #: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
 _PANELS = 4
+#: Largest length of the scale bar, as a part of the picture.
+_BAR = 0.45
+#: Half the width of a letter and half the height of a line, in points of a text of 11 points.
+_WIDE, _HIGH = 3.4, 6.0
+#: Distance of a text from its place in points, beside half its size; and ways in which it is looked for.
+_AWAY, _WAYS = 8.0, 16
 
 
-def figure(branch, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None):
+def figure(
+    branch, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
+    view: tuple[float, float] | None = None,
+):  # fmt: skip
     """Return the picture of a result as a matplotlib figure.
 
     Parameters
@@ -23,35 +35,74 @@ def figure(branch, shapes: int = 6, width: float | None = None, x: str | None = 
         Width of the drawn strip, in the unit of length of the scene.
     x, y : str, optional
         Columns across and upwards; by default each number that is followed, and what is conjugate to it.
+    view : (float, float), optional
+        The side from which strips are seen, azimuth and elevation in degrees; see `branches.draw.strip.View`.
     """
     from matplotlib.figure import Figure
 
-    chosen = choose(branch, shapes)
     panels = [(x or branch.panels[0][0], y or branch.panels[0][1])] if x or y else branch.panels[:_PANELS]
-    result = Figure(figsize=(max(9, 3.6 * len(panels)), 5.9 if chosen else 4.2), layout="constrained")
+    chosen = choose(branch, shapes, {stage for columns in panels for stage in _stages(branch, columns[0])})
+    result = Figure(figsize=(max(9, 3.6 * len(panels)), 6.2 if chosen else 4.5), layout="constrained")
     rows = result.subfigures(2 if chosen else 1, 1, height_ratios=[1, 2.6] if chosen else [1], squeeze=False)[:, 0]
     if chosen:
-        strips = [*branch.posed(chosen).values()]
-        wide = branch.drawn_width(strips, width)
-        reach = reach_of(strips, wide)
-        for number, strip in enumerate(strips):
-            axes = rows[0].add_subplot(1, len(strips), number + 1)
-            draw_strip(axes, strip, wide, reach)
-            axes.set_title(chr(ord("a") + number), fontsize=12, y=0.95)
-    seen: set = set()
+        _strips(rows[0], branch, chosen, width, branch.view if view is None else View(*view))
+    handles: dict[str, Any] = {}
     for number, columns in enumerate(panels):
         axes = rows[-1].add_subplot(1, len(panels), number + 1)
-        panel(axes, branch, columns, chosen, seen)
-        if len(panels) == 1:
-            axes.set_title(branch.caption, fontsize=12)
-    if len(panels) > 1:
-        result.suptitle(branch.caption, fontsize=12)
+        panel(axes, branch, columns, chosen)
+        for handle, word in zip(*axes.get_legend_handles_labels()):
+            handles.setdefault(word, handle)
+        axes.get_legend().remove()
+    rows[-1].legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False, fontsize=11)
+    result.suptitle(branch.caption, fontsize=12)
     return result
 
 
-def choose(branch, count: int) -> list[int]:
-    """Return the points whose strip is drawn: nearest to equal distances along all stages in a row, labelled ones preferred."""
+def _strips(row, branch, chosen: list[int], width: float | None, view: View) -> None:
+    """Draw the strips at some points side by side, all to one scale, which the first one shows, with the weight."""
+    strips = [*branch.posed(chosen).values()]
+    wide = branch.drawn_width(strips, width)
+    reach = reach_of(strips, wide, view)
+    for number, strip in enumerate(strips):
+        axes = row.add_subplot(1, len(strips), number + 1)
+        draw_strip(axes, strip, wide, reach, view)
+        axes.set_title(chr(ord("a") + number), fontsize=12, y=0.95)
+        if number == 0:
+            scale_bar(axes, branch, reach)
+            if branch.is_heavy:
+                weight_arrow(axes, reach, view)
+
+
+def scale_bar(axes, branch, reach: float) -> None:
+    """Draw a bar of a round length, in m where the scene has dimensions, otherwise in lengths of the strip."""
+    unit = branch.length / branch.shape_length
+    longest = _BAR * 2 * reach * unit
+    decade = 10.0 ** math.floor(math.log10(longest))
+    size = max(step * decade for step in (1, 2, 5) if step * decade <= longest)
+    x, y = -0.97 * reach, -0.9 * reach
+    axes.plot([x, x + size / unit], [y, y], color=OTHER, lw=2, solid_capstyle="butt")
+    words = f"{size:g} {'L' if branch.length == 1.0 else 'm'}"
+    axes.annotate(words, (x, y), (0, 3), textcoords="offset points", fontsize=9, color=OTHER)
+
+
+def weight_arrow(axes, reach: float, view: View) -> None:
+    """Draw where the weight pulls to."""
+    down = -view.axes[:2, 2]
+    tail = np.array([-0.9, -0.2]) * reach
+    style = {"arrowstyle": "-|>", "color": OTHER, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", tail + 0.4 * reach * down, tail, arrowprops=style)
+    axes.annotate("weight", tail, (4, -4), textcoords="offset points", va="top", fontsize=9, color=OTHER)
+
+
+def _stages(branch, followed: str) -> list[int]:
+    """Return the stages that follow a number or, where none does, all."""
+    return [stage.number for stage in branch.stages if stage.follow == followed] or [one.number for one in branch.stages]
+
+
+def choose(branch, count: int, stages: set[int]) -> list[int]:
+    """Return the points whose strip is drawn: nearest to equal distances along stages in a row, labelled ones preferred."""
     kept = branch.kept()
+    kept = kept[np.isin(branch.stage_of[kept], list(stages))]
     if not count or not len(kept):
         return []
     s = branch.way[kept]
@@ -67,27 +118,37 @@ def choose(branch, count: int) -> list[int]:
     return sorted(set(chosen) - again)
 
 
-def panel(axes, branch, columns: tuple[str, str], chosen, seen: set | None = None) -> None:
+def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
     """Draw a column against another: solid where stable, with marks at labelled points and letters at the strips drawn.
 
-    Of several stages, those that follow the column across are drawn, or all if none does. ``seen`` are words of the legend so
-    far.
+    Of several stages, those that follow the column across are drawn, or all if none does; each has its colour.
     """
-    seen = set() if seen is None else seen
+    seen: set = set()
     (across, *_), (up, *_) = axis = [branch.axis(column) for column in columns]
-    stages = [stage.number for stage in branch.stages if stage.follow == columns[0]] or [one.number for one in branch.stages]
+    stages = _stages(branch, columns[0])
     rows = np.flatnonzero(np.isin(branch.stage_of, stages))
-    for piece in branch.pieces():
+    curves, pieces = [], branch.pieces()
+    unknown = LINES[None][0] if all(piece.stable is None for piece in pieces) else UNKNOWN
+    for piece in pieces:
         if piece.stage in stages:
-            s = branch.points["arclength"][branch.stage_of == piece.stage]
+            dashes, words = LINES[piece.stable] if piece.stable is not None else (unknown, LINES[None][1])
             own = np.flatnonzero(branch.stage_of == piece.stage)
+            s = branch.points["arclength"][own]
             fine, x, y = smooth(s, s, across[own], up[own])
             here = (fine >= s[piece.rows[0] - own[0]]) & (fine <= s[piece.rows[-1] - own[0]])
-            dashes, words = LINES[piece.stable]
-            axes.plot(x[here], y[here], color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1, label=_once(words, seen))
+            axes.plot(x[here], y[here], color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1)
+            curves.append(np.column_stack([x[here], y[here]]))
+            if words not in seen:
+                axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
+    if len(branch.stages) > 1:
+        for stage in stages:
+            axes.plot([], [], color=branch.colour(stage), lw=1.8, label=f"stage {stage}")
+    texts = []
     for mark in branch.marks():
         if branch.stage_of[mark.row] in stages:
-            _mark(axes, mark, (across[mark.row], up[mark.row]), seen)
+            place = across[mark.row], up[mark.row]
+            _mark(axes, mark, place, seen)
+            texts.append((place, in_words(f"{place[0]:.4f}") if mark.label.told else ""))
     for snap in branch.snaps():
         if snap.column == columns[0] and columns[1] in snap.to:
             target = snap.to[columns[1]] * branch.scene.factor(columns[1])
@@ -98,11 +159,12 @@ def panel(axes, branch, columns: tuple[str, str], chosen, seen: set | None = Non
     axes.grid(alpha=0.25)
     axes.margins(0.16, 0.12)
     here = [point for point in chosen if branch.stage_of[point] in stages]
-    kept = [int(np.flatnonzero(rows == point)[0]) for point in here]
-    names = [chr(ord("a") + chosen.index(point)) for point in here]
-    _letters(axes, np.column_stack([across, up])[rows], branch.points["label"][rows], kept, names)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(frameon=False, fontsize=11)
+    plain = [point for point in here if branch.points["label"][point] == b""]
+    axes.scatter(across[plain], up[plain], s=18, color="#000000", zorder=2)
+    texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point))) for point in here]
+    axes.autoscale_view()
+    put(axes, texts, np.concatenate([*curves, np.column_stack([across, up])[rows]]))
+    axes.legend(frameon=False, fontsize=11)
 
 
 def _mark(axes, mark, place, seen: set) -> None:
@@ -110,8 +172,6 @@ def _mark(axes, mark, place, seen: set) -> None:
     fill = "white" if mark.open else mark.label.colour  # open: the branch goes on there
     colours = {"color": fill} if mark.label.marker == "x" else {"facecolor": fill, "edgecolor": mark.label.colour}
     axes.scatter(*place, marker=mark.label.marker, s=mark.label.size, zorder=3, label=_once(mark.word, seen), **colours)
-    if mark.label.told:
-        axes.annotate(in_words(f"{place[0]:.4f}"), place, (9, -3), textcoords="offset points", fontsize=11)
 
 
 def _arrow(axes, place, target: float, released: str) -> None:
@@ -129,14 +189,28 @@ def _once(name, seen: set):
     return label
 
 
-def _letters(axes, points, labels, chosen, names) -> None:
-    """Letters of the strips drawn, to the right of the curve as it goes; at a fold, which has a number there, to its left."""
-    axes.autoscale_view()
-    place = axes.transData.transform(points)
-    for number, letter in zip(chosen, names):
-        if labels[number] == b"":
-            axes.scatter(*points[number], s=18, color="#000000", zorder=2)
-        way = place[min(number + 1, len(place) - 1)] - place[max(number - 1, 0)]
-        right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if labels[number] == b"LP" else 13)
-        style = {"ha": "center", "va": "center", "fontsize": 12}
-        axes.annotate(letter, points[number], tuple(right), textcoords="offset points", **style)
+def put(axes, texts, curves: np.ndarray) -> None:
+    """Write texts beside their places, each on the side of it where it hides least of curves (K, 2), marks and other texts."""
+    to_screen = axes.transData.transform
+    dot = axes.figure.dpi / 72
+    hidden = to_screen(curves) / dot
+    marks = [to_screen(place) / dot for place, _ in texts]
+    frame = axes.get_window_extent().padded(-2 * dot)
+    low, high = np.array(frame.min) / dot, np.array(frame.max) / dot
+    boxes: list[np.ndarray] = []
+    for (place, text), at in zip(texts, marks):
+        if not text:
+            continue
+        half = np.array([_WIDE * len(text), _HIGH])
+        best = None
+        for way in range(_WAYS):
+            ahead = np.array([math.cos(2 * math.pi * way / _WAYS), math.sin(2 * math.pi * way / _WAYS)])
+            middle = at + ahead * (_AWAY + np.abs(ahead) @ half)
+            cost = np.count_nonzero((np.abs(hidden - middle) < half).all(axis=1))
+            cost += 100 * sum((np.abs(other - middle) < half + 6).all() for other in marks)
+            cost += 1000 * sum((np.abs(box[0] - middle) < half + box[1]).all() for box in boxes)
+            cost += 1000 * bool((middle - half < low).any() or (middle + half > high).any())
+            if best is None or cost < best[0]:
+                best = cost, middle
+        boxes.append(np.array([best[1], half]))
+        axes.annotate(text, place, best[1] - at, textcoords="offset points", ha="center", va="center", fontsize=11)

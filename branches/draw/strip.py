@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,13 +19,40 @@ PIXELS, _FINE = 480, 2
 _DENSE = 1.45
 #: Width of the line along an edge, in pixels and at most as a part of the strip.
 _LINE, _LINE_PART = 1.3, 0.12
-#: The way to the eye (azimuth -45, elevation 32 degrees), and to the lamp, which stands to its left and a little above.
-_EYE = np.array([0.59967, -0.59967, 0.52992])
-_LAMP = np.array([0.29, -0.65, 0.70]) / math.hypot(0.29, 0.65, 0.70)
+#: The way to the lamp: to the right, up, and towards the eye. It stands to the left of the eye and a little above.
+_LAMP = np.array([-0.25499, 0.24183, 0.93623])
 #: Stations along a strip at which two strips are compared: the turn between them is a mean over all.
 _STATIONS = 200
 #: Light from everywhere; the rest is the lamp's.
 _AMBIENT = 0.45
+
+
+@dataclass(frozen=True)
+class View:
+    """The side from which strips are seen.
+
+    Attributes
+    ----------
+    azimuth, elevation : float
+        Of the eye, in degrees: from the first axis around the vertical one, and above the horizontal plane. At azimuth -90 the
+        first axis points to the right.
+    """
+
+    azimuth: float
+    elevation: float
+
+    @property
+    def axes(self) -> np.ndarray:
+        """The directions in space that point right and up in the picture, and to the eye: the rows of a matrix (3, 3)."""
+        around, above = math.radians(self.azimuth), math.radians(self.elevation)
+        right = np.array([-math.sin(around), math.cos(around), 0.0])
+        eye = np.array([math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)])
+        return np.array([right, np.cross(eye, right), eye])
+
+
+#: Closed strips have no horizontal: they are seen at an angle. Open ones begin along the first axis, which is horizontal in the
+#: picture, and their width is seen from above.
+OBLIQUE, SIDE = View(-45.0, 32.0), View(-90.0, 20.0)
 
 
 def steady(strips: dict) -> dict:
@@ -47,20 +74,20 @@ def places(strip) -> np.ndarray:
     return np.column_stack([np.interp(stations, strip.arclength, x) for x in strip.centreline.T])
 
 
-def reach_of(shapes, width: float) -> float:
+def reach_of(shapes, width: float, view: View = OBLIQUE) -> float:
     """Half the side of the square in which all these strips have room."""
-    right, up = _screen()
     corners = np.concatenate([shape.surface(width).reshape(-1, 3) for shape in shapes])
-    return 1.03 * float(np.abs(corners @ np.column_stack([right, up])).max())
+    return 1.03 * float(np.abs(corners @ view.axes[:2].T).max())
 
 
-def draw_strip(axes, shape, width: float, reach: float, pixels: int = PIXELS) -> None:
-    """Draw a strip, seen from above at an angle, as far as ``reach`` from the middle of its centreline."""
-    axes.imshow(rendered(shape, width, reach, pixels), extent=(-reach, reach, -reach, reach), interpolation="antialiased")
+def draw_strip(axes, shape, width: float, reach: float, view: View = OBLIQUE, pixels: int = PIXELS) -> None:
+    """Draw a strip, seen from a side, as far as ``reach`` from the origin."""
+    picture = rendered(shape, width, reach, pixels, view)
+    axes.imshow(picture, extent=(-reach, reach, -reach, reach), interpolation="antialiased")
     axes.set_axis_off()
 
 
-def rendered(shape, width: float, reach: float, pixels: int) -> np.ndarray:
+def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQUE) -> np.ndarray:
     """The picture of a strip, shape (pixels, pixels, 4), between 0 and 1; alpha is the part of a pixel that is covered.
 
     The surface is sampled more densely than the pixels, and of the samples in a pixel the one nearest to the eye is seen: no
@@ -69,7 +96,8 @@ def rendered(shape, width: float, reach: float, pixels: int) -> np.ndarray:
     fine = pixels * _FINE
     scale = fine / (2 * reach)
     points, normals, across = _samples(shape, width, scale)
-    place, nearness = _places(points, reach, fine)
+    screen = points.reshape(-1, 3) @ view.axes.T
+    place, nearness = _places(screen, reach, fine)
     seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
     seen = seen[place[seen] >= 0]
     nearest = np.full(fine * fine, -1)
@@ -78,7 +106,7 @@ def rendered(shape, width: float, reach: float, pixels: int) -> np.ndarray:
     station, number = np.divmod(nearest[covered], len(across))
     line = min(_LINE * _FINE / scale, _LINE_PART * width)
     canvas = np.zeros((fine * fine, 4), np.float32)
-    canvas[covered] = _colours(normals[station], width / 2 - np.abs(across[number]) < line)
+    canvas[covered] = _colours(normals[station] @ view.axes.T, width / 2 - np.abs(across[number]) < line)
     canvas = canvas.reshape(pixels, _FINE, pixels, _FINE, 4).mean(axis=(1, 3))
     canvas[..., :3] /= np.maximum(canvas[..., 3:], 1e-6)
     return canvas.clip(0, 1)
@@ -100,27 +128,18 @@ def _samples(shape, width: float, scale: float) -> tuple[np.ndarray, np.ndarray,
     return points, normal / np.linalg.norm(normal, axis=1)[:, None], across
 
 
-def _places(points, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixel, -1 outside the picture, and the nearness to the eye of all points."""
-    right, up = _screen()
-    screen = points.reshape(-1, 3) @ np.column_stack([right, up, _EYE])
+def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pixel, -1 outside the picture, and the nearness to the eye of points (N, 3) on the axes of a view."""
     pixel = ((screen[:, :2] * [1, -1] + reach) * (fine / (2 * reach))).astype(np.intp)
     inside = (np.abs(screen[:, :2]) < reach).all(axis=1)
     return np.where(inside, pixel[:, 1] * fine + pixel[:, 0], -1), screen[:, 2].astype(np.float32)
 
 
-def _screen() -> tuple[np.ndarray, np.ndarray]:
-    """The directions in space that point right and up in the picture."""
-    right = np.cross([0, 0, 1.0], _EYE)
-    right /= np.linalg.norm(right)
-    return right, np.cross(_EYE, right)
-
-
 def _colours(normals, at_edge) -> np.ndarray:
-    """Lit colours (K, 4) of the side that is seen."""
+    """Lit colours (K, 4) of the side that is seen, from normals on the axes of a view."""
     from matplotlib.colors import to_rgb
 
-    facing = normals @ _EYE
+    facing = normals[:, 2]
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LAMP)
     colours = np.ones((len(normals), 4), np.float32)
     colours[:, :3] = np.where((facing > 0)[:, None], to_rgb(FRONT), to_rgb(BACK)) * light[:, None]

@@ -45,6 +45,11 @@ def parser() -> Parser:
         "--out", metavar="NAME", action="append", default=[],
         help=f"file to write; may be repeated; the ending chooses the format: {', '.join((*SURFACES, '.csv'))}",
     )  # fmt: skip
+    parser.add_argument(
+        "--table",
+        metavar="NAME",
+        help="table of all points of the branch in its units (SI where the scene has dimensions), .csv",
+    )
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
     parser.add_argument(
         "--length", type=Quantity("m"), metavar="X",
@@ -81,6 +86,8 @@ def _export(options) -> int:
         check(options)
         branch = read_branch(options.result)
         files = _strip_files(branch, options) if options.out else {}
+        if options.table:
+            files[Path(options.table)] = _csv(branch.in_units())
         for path in (*files, *([Path(options.movie)] if options.movie else [])):
             prepare(path)
         if options.movie:
@@ -108,8 +115,11 @@ def check(options) -> None:
     """
     from branches.scene.fields import ConfigError
 
-    if not options.out and not options.movie:
-        raise ConfigError("--out: is needed, as in --point LP --out strip.stl; or --movie, as in --movie fold.gif")
+    if not (options.out or options.movie or options.table):
+        raise ConfigError(
+            "--out: is needed, as in --point LP --out strip.stl; or --movie, as in --movie fold.gif; or --table, as in "
+            "--table points.csv"
+        )
     if options.out and not options.point:
         raise ConfigError("--point: is needed with --out, as in --point LP")
     for name in ("length", "width", "thickness"):
@@ -122,11 +132,14 @@ def check(options) -> None:
         raise ConfigError(f"--frames {options.frames}: must be from {_FRAMES[0]} to {_FRAMES[1]}")
     names = [("--out", name, (*SURFACES, ".csv")) for name in options.out]
     names += [("--movie", options.movie, MOVIES)] if options.movie is not None else []
+    names += [("--table", options.table, (".csv",))] if options.table is not None else []
     seen = {Path(options.result).resolve(): "is the result itself"}
     for option, name, endings in names:
         path = Path(name)
         if path.suffix.lower() not in endings:
-            raise ConfigError(f"{option} {name!r}: must end in {', '.join(endings[:-1])} or {endings[-1]}")
+            raise ConfigError(
+                f"{option} {name!r}: must end in {' or '.join(filter(None, (', '.join(endings[:-1]), endings[-1])))}"
+            )
         if path.exists() and not path.is_file():
             raise ConfigError(f"{option} {name!r}: must be a file")
         if path.resolve() in seen:
@@ -197,8 +210,14 @@ def _table(shape: Shape, strains) -> bytes:
     import numpy as np
 
     names = ["s", "x", "y", "z", *(f"d{i}_{axis}" for i in (1, 2, 3) for axis in "xyz"), "omega_1", "omega_2", "omega_3"]
-    rows = np.column_stack([shape.arclength, shape.centreline, shape.directors.reshape(-1, 9), strains])
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
+    columns = np.column_stack([shape.arclength, shape.centreline, shape.directors.reshape(-1, 9), strains]).T
+    return _csv(dict(zip(names, columns)))
+
+
+def _csv(columns: dict[str, ndarray]) -> bytes:
+    """Return columns as comma-separated values with a line of names, numbers with all their digits."""
+    rows = zip(*(column.tolist() for column in columns.values()))
+    lines = [",".join(columns), *(",".join(map(str, row)) for row in rows)]
     return ("\n".join(lines) + "\n").encode()
 
 

@@ -9,10 +9,11 @@ import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from branches.draw.picture import panel
+from branches.draw.picture import panel, scale_bar, weight_arrow
 from branches.draw.strip import draw_strip, places, reach_of
 from branches.store.files import StoreError
 
@@ -69,22 +70,37 @@ def drawn(branch, strips: dict, width: float, dpi: int) -> Iterator[np.ndarray]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure, reach = Figure(figsize=(_SIZE, _SIZE), dpi=dpi), reach_of(strips.values(), width)
+    figure, reach = Figure(figsize=(_SIZE, _SIZE), dpi=dpi), reach_of(strips.values(), width, branch.view)
     canvas = FigureCanvasAgg(figure)
     above = figure.add_axes((0.22, 0.41, 0.57, 0.57))
-    below = figure.add_axes((0.12, 0.09, 0.84, 0.26))
-    columns = branch.panels[0]
-    panel(below, branch, columns, [])
-    below.set_title(branch.caption, fontsize=12)
-    across, up = (branch.axis(column)[0] for column in columns)
-    below.yaxis.label.set_size(10)  # it is longer than the axes are high
-    (dot,) = below.plot([], [], "o", color="#000000", ms=11, mec="white", zorder=4)
+    words: dict[str, Any] = {}
+    graphs = {columns[0]: _graph(figure, branch, columns, words) for columns in branch.panels}
+    figure.legend(words.values(), words.keys(), loc="upper left", frameon=False, fontsize=9)  # beside the strip
     for point, strip in strips.items():
         above.clear()
-        draw_strip(above, strip, width, reach, pixels=round(0.57 * _SIZE * dpi))
-        dot.set_data([across[point]], [up[point]])
+        draw_strip(above, strip, width, reach, branch.view, round(0.57 * _SIZE * dpi))
+        scale_bar(above, branch, reach)
+        if branch.is_heavy:
+            weight_arrow(above, reach, branch.view)
+        here = branch.followed(int(branch.stage_of[point]))
+        for name, (below, dot, across, up) in graphs.items():
+            below.set_visible(name == here)
+            dot.set_data([across[point]], [up[point]])
         canvas.draw()
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _graph(figure, branch, columns: tuple[str, str], words: dict[str, Any]) -> tuple[Any, Any, np.ndarray, np.ndarray]:
+    """Draw the curve of a number that is followed; return its axes, the dot, and both columns. ``words`` are of the legend."""
+    below = figure.add_axes((0.12, 0.09, 0.84, 0.26))
+    panel(below, branch, columns, [])
+    for handle, word in zip(*below.get_legend_handles_labels()):
+        words.setdefault(word, handle)
+    below.get_legend().remove()
+    below.set_title(branch.caption, fontsize=12)
+    below.yaxis.label.set_size(9)  # it is longer than the axes are high
+    (dot,) = below.plot([], [], "o", color="#000000", ms=11, mec="white", zorder=4)
+    return below, dot, *(branch.axis(column)[0] for column in columns)
 
 
 def _gif(frames: Iterable[np.ndarray]) -> bytes:

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contin.lowlevel import hermite
+
 #: A spline takes so many points; fewer are joined by straight lines.
 _FEWEST = 4
 #: Halvings of an interval in the search of a place: more would not change a double.
@@ -46,9 +48,9 @@ def places(pieces: Sequence[dict], column: str, value: float, wanted: Sequence[s
     low, high = np.zeros(len(inside)), np.ones(len(inside))
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        before = (_hermite(cubic, middle)[:, 0] > value) == (y0[:, 0] > value)
+        before = (hermite(*cubic, middle[:, None])[:, 0] > value) == (y0[:, 0] > value)
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    found = _hermite(cubic, (low + high) / 2)
+    found = hermite(*cubic, (low + high)[:, None] / 2)
     return [(int(met[owner[i]]), dict(zip(wanted, row[1:].tolist()))) for i, row in zip(inside, found)]
 
 
@@ -124,10 +126,3 @@ def _slopes(s: np.ndarray, values: np.ndarray, owner: np.ndarray) -> tuple[np.nd
     d = solve_banded((1, 1), bands, right)
     straight = ~long[owner[:-1], None]
     return np.where(straight, secants, d[:-1]), np.where(straight, secants, d[1:])
-
-
-def _hermite(cubic: tuple[np.ndarray, ...], u: np.ndarray) -> np.ndarray:
-    """Return cubics at u (K,) in the unit interval, shape (K, columns), from values and slopes: y(0), y'(0), y'(1), y(1)."""
-    y0, d0, d1, y1 = cubic
-    u = u[:, None]
-    return y0 + u * (d0 + u * (3 * (y1 - y0) - 2 * d0 - d1 + u * (2 * (y0 - y1) + d0 + d1)))

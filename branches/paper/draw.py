@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from branches.store.files import write_picture
+from contin.lowlevel import Colour
 
-STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
+STABLE, UNSTABLE, MODES, RIGID = Colour.BLUE, Colour.VERMILION, "#8a6d3b", Colour.BLACK
 UNSTABLE_FILL = "#F3B48B"
 #: Stable states that are buckled, beside stable circles.
-BUCKLED = "#56B4E9"
+BUCKLED = Colour.SKY
 
 
 def keep(figure, folder: Path, name: str) -> str:

@@ -10,12 +10,13 @@ from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.paper.shell_run import DEFAULT, Outcome, ShellError, compute, describe, read
 from branches.store.command import write_output
+from contin.lowlevel import Colour
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.unfolding import FLAT, first_root
 
 #: Where the results are kept, in the folder of the page.
 FILE = "shell.h5"
-COLOURS = {0.1: UNSTABLE, 0.2: "#009E73", 0.3: STABLE}
+COLOURS = {0.1: UNSTABLE, 0.2: Colour.GREEN, 0.3: STABLE}
 MARKERS = {4.0: "o", 8.0: "s", 16.0: "^"}
 NUS = (0.1, 0.3)
 #: The least w**2/(R h) drawn; below it the law is a flat rod.

@@ -192,6 +192,10 @@ class Scene(Strict):
         """Return the unit of a column, '' without one."""
         return ""
 
+    def natural_unit(self, column: str) -> str:
+        """Return what a column is divided by where the scene has no units, by the strip's own numbers; '' for ratios."""
+        return ""
+
     def up_to(self, count: int) -> Scene:
         """Return the scene with its first stages alone."""
         return self

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from contin.lowlevel import Colour
+
 #: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
 #: known: its tolerance is this part of the size of a number.
 _NOTHING = 1e-12
-# Okabe-Ito colours: told apart by the colour-blind, and in print
-FOLD, END, USER, SECONDARY = "#D55E00", "#000000", "#009E73", "#CC79A7"
+FOLD, END, USER, SECONDARY = Colour.VERMILION, Colour.BLACK, Colour.GREEN, Colour.PURPLE
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ LABELS = {
 CONJUGATE = {
     "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
-    "weight": "rise", "roller": "F_roller",
+    "weight": "rise", "roller": "F_roller", "stroke": "F_stroke",
 }  # fmt: skip
 #: Labels of points at which the pieces of a branch begin and end.
 SPECIAL = ("LP", "BP", "SB", "EP", "MX")

@@ -21,6 +21,7 @@ from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Pr
 from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text, point_of
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
+from ribbon_model.loads import STROKE
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
 #: A stage may start outside its limits by this part of them: it may start where another one has stopped. Points at limits are
@@ -57,6 +58,7 @@ _WORDS = {
     "energy": ("elastic energy, zero in the natural state, and potential of weight and foundation", "energy"),
     "potential": ("energy and the potential of dead loads at the last end: the one of which the index is", "potential"),
     "F_roller": ("force of the roller on the strip", "force of the roller"),
+    "F_stroke": ("force on the strip at its last end, along the direction of the stroke", "force along the stroke"),
 }  # fmt: skip
 _WORDS |= {
     f"{start}{kind}_{along}": (
@@ -267,7 +269,12 @@ class OpenStage(Stage):
         columns = [_column(name, error_of(name) if name in followed else None) for name in numbers]
         columns += [_column(name, error_of(name), role=FOUND) for name in found]
         columns.append(Column("stage", "stage of the scene, from 1", lambda row: row.stage.number, None, "i4", BOOK))
-        own = ("potential", *REACTIONS, *(("F_roller",) if self.scene.roller else ()))
+        own = (
+            "potential",
+            *REACTIONS,
+            *(("F_roller",) if self.scene.roller else ()),
+            *(("F_stroke",) if STROKE in numbers else ()),
+        )
         return Columns((*columns, *(_column(name, error_of(name), role=FOUND) for name in own)), True)
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:

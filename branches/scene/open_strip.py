@@ -36,6 +36,8 @@ _UNITS = {
     "weight": (-3, 1, "N/m"), "foundation": (-4, 1, "N/m^2"), **dict.fromkeys(("kappa_n", "kappa_2", "tau_n"), (-1, 0, "1/m")),
     **dict.fromkeys(("energy", "potential"), (-1, 1, "J")),
 }  # fmt: skip
+#: Powers of the length L and the modulus B, as axes write them.
+_NATURAL = {(1, 0): "L", (-1, 0): "1/L", (-1, 1): "B/L", (-2, 1): "B/L²", (-3, 1): "B/L³", (-4, 1): "B/L⁴"}
 #: Laws of a strip with dimensions; the first one if none is given.
 _OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
 
@@ -293,6 +295,11 @@ class OpenScene(Scene):
     def unit(self, name: str) -> str:
         """Return the unit of a number, '' without dimensions."""
         return _unit_of(name)[2] if self.dimensions is not None else ""
+
+    def natural_unit(self, name: str) -> str:
+        """Return what a number is divided by: powers of the length L and the bending modulus B; '' for ratios."""
+        length, modulus, unit = _unit_of(name)
+        return _NATURAL[length, modulus] if length or modulus else unit
 
     def _material(self) -> Section:
         values = dict(self.material)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from branches.draw.strip import OBLIQUE, View
 from branches.scene.columns import Columns
 from branches.scene.fields import Scene
 from branches.scene.labels import SPECIAL, Label, label_of
@@ -253,13 +254,26 @@ class StoredBranch(ABC):
 
     def axis(self, name: str) -> tuple[np.ndarray, str]:
         """Return a column in its unit, and the words of its axis."""
-        column, unit = self.columns.all.get(name), self.scene.unit(name)
-        words = name if column is None else column.axis or name
-        return self.column(name) * self.scene.factor(name), f"{words} in {unit}" if unit else words
+        values, unit = self.measured(name)
+        words = self.axis_words(name)
+        return values, f"{words} in {unit}" if unit else words
+
+    def axis_words(self, name: str) -> str:
+        """Return the words of an axis, without a unit."""
+        column = self.columns.all.get(name)
+        return name if column is None else column.axis or name
+
+    def measured(self, name: str) -> tuple[np.ndarray, str]:
+        """Return a column in its unit, and the unit: that of the scene or, without dimensions, what it is divided by."""
+        return self.column(name) * self.scene.factor(name), self._unit(name)
+
+    def _unit(self, name: str) -> str:
+        """Return the unit of a column: that of the scene or, without dimensions, what it is divided by."""
+        return self.scene.unit(name) or self.scene.natural_unit(name)
 
     def words_of(self, name: str, value: float) -> str:
         """Return a value of a column with three digits and its unit."""
-        return f"{value * self.scene.factor(name):.3g} {self.scene.unit(name)}".strip()
+        return f"{value * self.scene.factor(name):.3g} {self._unit(name)}".strip()
 
     def marks(self) -> Iterator[Mark]:
         """Yield the marks of labelled points."""
@@ -272,6 +286,16 @@ class StoredBranch(ABC):
     def colour(self, stage: int) -> str:
         """Return the colour of a stage."""
 
+    @property
+    def view(self) -> View:
+        """The side from which pictures show strips."""
+        return OBLIQUE
+
+    @property
+    def is_heavy(self) -> bool:
+        """Whether the strip has weight, which pulls downwards in pictures."""
+        return False
+
     @abstractmethod
     def posed(self, points: list[int]) -> dict[int, Shape]:
         """Return the strips at kept points as pictures show them, all from one side."""
@@ -280,11 +304,14 @@ class StoredBranch(ABC):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         """Return the width of drawn strips: the one asked for, or that of the scene; narrower where generators would cross."""
 
-    def plot(self, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None):
+    def plot(
+        self, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
+        view: tuple[float, float] | None = None,
+    ):  # fmt: skip
         """Return the result as a matplotlib figure; see `branches.draw.picture.figure`."""
         from branches.draw.picture import figure
 
-        return figure(self, shapes, width, x, y)
+        return figure(self, shapes, width, x, y, view)
 
     def _repr_html_(self) -> str:
         from branches.draw.notebook import to_html
@@ -293,12 +320,26 @@ class StoredBranch(ABC):
 
     # --- tables ---------------------------------------------------------------------------------------------------------
 
-    def to_pandas(self):
-        """Return the table of points as a ``pandas.DataFrame``; ImportError says what to install if pandas is missing."""
+    def in_units(self) -> dict[str, np.ndarray]:
+        """Return the table of points in its units: those of the scene's dimensions, SI; names are as in ``distance [m]``."""
+        found = {}
+        for name in self.points.dtype.names:
+            kind = self.points.dtype[name].kind
+            values, unit = self.measured(name) if kind == "f" else (self.points[name], "")
+            found[f"{name} [{unit}]" if unit else name] = np.char.decode(values, "utf-8") if kind == "S" else values
+        return found
+
+    def to_pandas(self, units: bool = False):
+        """Return the table of points as a ``pandas.DataFrame``, as it is stored or in its units (`in_units`).
+
+        ImportError says what to install if pandas is missing.
+        """
         try:
             import pandas
         except ImportError as error:
             raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
+        if units:
+            return pandas.DataFrame(self.in_units())
         return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
 
     def to_xarray(self):

@@ -23,6 +23,8 @@ from ribbon_model.strip import Strip
 
 #: Strips that are compared to see from which side to look; a tenth of them may miss how a strip turns over.
 _BETWEEN = 60
+#: The end of the words of curvatures, which says what they are multiplied by.
+_OVER = "L/2π"
 #: Kinds of `branches.scene.labels` that a legend says in other words, or not at all.
 _WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle", "branch point": None}
 
@@ -82,12 +84,14 @@ class ClosedBranch(StoredBranch):
         secondary = "secondary branch of " if scene.origin else ""
         return f"{what}, {secondary}(m, n) = ({scene.m}, {scene.n}), $\\nu$ = {in_words(scene.nu)}"
 
-    def axis(self, name: str) -> tuple[np.ndarray, str]:
-        """As `StoredBranch.axis`; curvatures are in 1/m if the scene has the sizes of its strip."""
-        values, words = super().axis(name)
-        if self.scene.strip and words.endswith("L/2π"):
-            return 2 * math.pi / self.length * values, f"{words.removesuffix('L/2π')} in 1/m"
-        return values, words
+    def measured(self, name: str) -> tuple[np.ndarray, str]:
+        """As `StoredBranch.measured`; curvatures are in 1/m if the scene has the sizes of its strip."""
+        if self.scene.strip and super().axis_words(name).endswith(_OVER):
+            return 2 * math.pi / self.length * self.column(name), "1/m"
+        return super().measured(name)
+
+    def axis_words(self, name: str) -> str:
+        return super().axis_words(name).removesuffix(_OVER if self.scene.strip else "")
 
     def marks(self) -> Iterator[Mark]:
         for event in self.events:

@@ -10,10 +10,11 @@ import numpy as np
 
 from branches.draw.shapes import standing
 from branches.draw.solid import widest
-from branches.draw.strip import ROOM
+from branches.draw.strip import ROOM, SIDE, View
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
+from contin.lowlevel import PALETTE
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
@@ -23,8 +24,6 @@ from ribbon_model.shape import Shape, interpolated, shape_of
 _SAME = 1e-6
 #: Width of a drawn strip of unknown dimensions, over its length.
 _WIDTH = 0.06
-#: Colours of stages (Okabe and Ito), told apart by the colour-blind.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 class OpenBranch(StoredBranch):
@@ -106,7 +105,7 @@ class OpenBranch(StoredBranch):
     def up(self) -> tuple[float, float, float]:
         """The direction that is up in pictures: against the weight, if there is one, otherwise the normal of the first end."""
         strip = self.scene.strip()
-        return tuple(-x for x in strip.weight_direction) if "weight" in strip.parameters else DIRECTIONS["normal"]
+        return tuple(-x for x in strip.weight_direction) if self.is_heavy else DIRECTIONS["normal"]
 
     @property
     def about(self) -> str:
@@ -126,16 +125,22 @@ class OpenBranch(StoredBranch):
         return self.about
 
     def colour(self, stage: int) -> str:
-        return _COLOURS[(stage - 1) % len(_COLOURS)]
+        return PALETTE[(stage - 1) % len(PALETTE)]
 
     def posed(self, points: list[int]) -> dict[int, Shape]:
-        """As `StoredBranch.posed`: the direction `up` is up, and each strip in the middle of its picture."""
-        found = {}
-        for point in points:
-            shape = standing(self.shape(point), self.up)
-            middle = (shape.centreline.max(axis=0) + shape.centreline.min(axis=0)) / 2
-            found[point] = replace(shape, centreline=shape.centreline - middle)
-        return found
+        """As `StoredBranch.posed`: the direction `up` is up, and the first end, which does not move, is in one place in all."""
+        found = {point: standing(self.shape(point), self.up) for point in points}
+        all_points = np.concatenate([shape.centreline for shape in found.values()] or [np.zeros((1, 3))])
+        middle = (all_points.max(axis=0) + all_points.min(axis=0)) / 2
+        return {point: replace(shape, centreline=shape.centreline - middle) for point, shape in found.items()}
+
+    @property
+    def view(self) -> View:
+        return SIDE
+
+    @property
+    def is_heavy(self) -> bool:
+        return "weight" in self.scene.strip().parameters
 
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         if asked is None:

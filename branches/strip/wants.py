@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from branches.run.progress import Progress
 from branches.store.files import write_picture
 from branches.strip.states import at_natural_curvatures, circle_name
+from contin.lowlevel import Colour
 from ribbon_model import linear, stability
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.strip import Strip
@@ -138,7 +139,7 @@ def _figure(strip: Strip, m: int, kappas: np.ndarray, table: np.ndarray):
     bar.set_label(f"barrier, in units of $4\\pi^2 B/L$, here {strip.energy_unit:.3g} J")
     for edge, style in ((-1, "--"), (0, "-")):
         axes.plot(_GAMMAS, kappas[:, edge], style, color="black", label=("lower", "upper")[edge] + " end of stability")
-    mark = {"marker": "o", "markersize": 8, "color": "#D55E00", "markeredgecolor": "white", "linestyle": "none"}
+    mark = {"marker": "o", "markersize": 8, "color": Colour.VERMILION, "markeredgecolor": "white", "linestyle": "none"}
     axes.plot(strip.Gamma, strip.kappa_n, label="this strip", **mark)
     axes.set_xscale("log")
     axes.margins(0.02, 0.08)

@@ -14,7 +14,8 @@ from contin.core.labels import Label
 from contin.errors import ProblemError
 from contin.results.axes import Axes, new_axes
 from contin.results.colours import Colour
-from contin.results.curve import PARTS, column, curve
+from contin.results.cubic import PARTS
+from contin.results.curve import column, curve
 from contin.results.point import Point
 
 #: Labelled points: matplotlib's symbol, colour, and the words of the legend.
@@ -45,8 +46,12 @@ _MARKS = {
 _OTHER_MARK = (".", Colour.BLACK, "")
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
 _CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)
-#: Dashes and legend of pieces, by whether they are stable; None: not known.
-_LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
+#: Dashes and legend of pieces, by whether they are stable; None: not known, beside others of which it is known.
+_LINES: dict[bool | None, tuple[Any, str]] = {
+    True: ("-", "stable"),
+    False: ((0, (3, 2)), "unstable"),
+    None: ((0, (6, 2, 1, 2)), "stability not known"),
+}
 #: Words of axes for columns that every branch has.
 _WORDS = {
     "norm": "norm (root mean square of the states)", "arclength": "arclength of the branch",
@@ -95,7 +100,7 @@ def _draw(
         return label
 
     for stable, piece in pieces:
-        dashes, word = _LINES[stable]
+        dashes, word = _LINES[stable] if len(pieces) > 1 or stable is not None else ("-", None)
         fine = slice(piece.start * PARTS, (piece.stop - 1) * PARTS + 1)
         axes.plot(x[fine], y[fine], lw=1.5, color=Colour.BLUE, ls=dashes, label=once(word), zorder=1)
     _tell(axes, axes.scatter(across, up, s=_DOT, color=Colour.BLUE, picker=True, pickradius=_NEAR, zorder=1.5), points)

@@ -23,13 +23,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from contin.lowlevel import PALETTE
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS, KEPT = ROOT / "docs" / "gallery", ROOT / ".cache" / "gallery"
-#: Colours of Okabe and Ito, which the colour-blind can tell apart.
-COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 STYLE = {
     "savefig.dpi": 150, "font.size": 10.5,
-    "axes.prop_cycle": f"cycler('color', {COLOURS})", "axes.spines.top": False, "axes.spines.right": False,
+    "axes.prop_cycle": f"cycler('color', {[*map(str, PALETTE)]})", "axes.spines.top": False, "axes.spines.right": False,
     "axes.titlesize": 10.5, "lines.linewidth": 1.6, "legend.frameon": False,
 }  # fmt: skip
 #: What stands in the overview where the thumbnails go.

@@ -1,5 +1,6 @@
 """Pictures: stable parts solid, unstable ones dashed, colours by wavenumber, marks that say what they are."""
 
+import itertools
 import math
 import runpy
 
@@ -7,11 +8,14 @@ import numpy as np
 import pytest
 from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from scipy.interpolate import CubicSpline
 
 from branches.draw import strip as draw_strip
 from branches.draw.picture import figure, panel
 from branches.draw.solid import widest
 from branches.draw.style import colour_of
+from branches.export.film import drawn as frames
 from branches.export.film import evenly
 from branches.graph.disentangle import crossings
 from branches.graph.picture import circles, conjugate, heights, legend, lines
@@ -43,7 +47,7 @@ def drawn(folder, scene):
 
 def test_stable_is_solid_and_unstable_is_dashed(tmp_path):
     axes = drawn(tmp_path, "{m: 1, n: 2, stability: true}")
-    stable, unstable = axes.lines
+    stable, unstable = (line for line in axes.lines if len(line.get_xdata()))
     assert stable.get_linestyle() == "-" and unstable.get_linestyle() == "--"
     assert stable.get_ydata()[-1] == pytest.approx(unstable.get_ydata()[0], abs=0.05)  # both reach the fold
     words = [text.get_text() for text in axes.get_legend().get_texts()]
@@ -54,8 +58,8 @@ def test_stable_is_solid_and_unstable_is_dashed(tmp_path):
 def test_a_limit_is_said_to_be_the_scenes(tmp_path):
     axes = drawn(tmp_path, "{law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert words == ["bifurcation of a circle", "limit of the scene"] and axes.get_title().startswith("flat rod,")
-    assert len(axes.lines) == 1 and same_color(axes.lines[0].get_color(), colour_of(1))
+    assert words == ["stability not computed", "bifurcation of a circle", "limit of the scene"]
+    assert axes.get_title().startswith("flat rod,") and same_color(axes.lines[0].get_color(), colour_of(1))
 
 
 def test_the_script_says_which_family_it_draws(tmp_path, call, root):
@@ -65,6 +69,84 @@ def test_the_script_says_which_family_it_draws(tmp_path, call, root):
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
     assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
     assert call(main, tmp_path / "two", "--out", "x.png", "--plain", "--nu", "0.31").out == "written to x.png\n"
+
+
+# --- open strips ------------------------------------------------------------------------------------------------------
+
+STROKE = """
+material: {}
+dimensions: {width: 12 mm, thickness: 0.2 mm, length: 300 mm, poisson_ratio: 0.3, youngs_modulus: 200 GPa}
+numbers: {distance: 0.28}
+begin: arch
+directions: {stroke: [0, 1, 0]}
+stages: [{follow: distance, to: 0.25}, {follow: stroke, to: 0.1}]
+"""
+HEAVY = """
+material: {law: flat rod, nu: 0.3}
+finish: free
+directions: {weight: [0, -1, 0]}
+stages: [{follow: weight, to: 3}]
+"""
+
+
+@pytest.fixture(scope="module")
+def stroke(tmp_path_factory):
+    return branch_of(tmp_path_factory.mktemp("stroke"), STROKE)
+
+
+def test_a_horizontal_strip_is_horizontal_and_its_clamp_stays_where_it_is(tmp_path):
+    """The cantilever begins along the horizontal and sinks; at weight 0 it is a horizontal line from end to end."""
+    branch = branch_of(tmp_path, HEAVY)
+    strips = branch.posed(branch.kept().tolist())
+    seen = [strip.centreline @ branch.view.axes[:2].T for strip in strips.values()]
+    assert np.ptp(seen[0][:, 1]) < 1e-12 and np.ptp(seen[0][:, 0]) == pytest.approx(1)
+    assert np.ptp([places[0] for places in seen], axis=0).max() < 1e-12
+    assert np.diff([places[-1, 1] for places in seen]).max() < 0
+    picture = figure(branch, 3)
+    (arrow,) = [text for text in picture.findobj(Text) if text.get_text() == "weight"]
+    assert arrow.axes is picture.subfigs[0].axes[0]
+    axes = picture.subfigs[1].axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("weight per length in B/L³", "displacement along the normal in L")
+
+
+def test_a_scale_is_a_round_length(stroke):
+    first = figure(stroke, 3).subfigs[0].axes[0]
+    (bar,) = first.lines
+    (words,) = [text.get_text() for text in first.texts]
+    assert words == "0.1 m" and np.ptp(bar.get_xdata()) == pytest.approx(0.1 / 0.3)  # the strip has length 1 there
+    assert not any(axes.lines for axes in figure(stroke, 3).subfigs[0].axes[1:])
+    seen = figure(stroke, 1, view=(-90.0, 90.0)).subfigs[0].axes[0].images[0].get_array()
+    assert np.count_nonzero(seen[..., 3].any(axis=1)) < 30  # from above, an arch is a line
+
+
+def test_the_force_of_a_stroke_is_the_rate_of_the_energy(stroke):
+    """In N, J and m; by the spline through the points of the stage."""
+    table = stroke.to_pandas(units=True)
+    table = table[table["stage"] == 2].drop_duplicates("stroke [m]")
+    rate = CubicSpline(table["stroke [m]"], table["energy [J]"])(table["stroke [m]"], 1)
+    assert np.abs(rate - table["F_stroke [N]"]).max() < 2e-3 * table["F_stroke [N]"].abs().max()
+    assert [panel for panel, *_ in stroke.panels] == ["distance", "stroke"] and stroke.panels[1][1] == "F_stroke"
+    assert stroke.axis("F_stroke")[1] == "force along the stroke in N"
+
+
+def test_a_film_shows_the_graph_of_the_stage(stroke):
+    """The words below the axes: those of one stage for its points, other ones for those of the next stage."""
+    points = [0, 4, len(stroke.points) - 1]
+    assert stroke.stage_of[points].tolist() == [1, 1, 2]
+    first, again, last = (frame[-20:] for frame in frames(stroke, stroke.posed(points), 0.04, 50))
+    assert np.array_equal(first, again) and not np.array_equal(first, last)
+
+
+def test_texts_hide_no_marks_and_no_other_texts(root, tmp_path):
+    branch = branch_of(tmp_path, load(root / "configs" / "open_clamped.yaml"))
+    picture = figure(branch)
+    picture.draw_without_rendering()
+    axes = picture.subfigs[1].axes[1]
+    boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
+    assert len(boxes) == 7  # five letters, two folds
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    frame = axes.get_window_extent()
+    assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in boxes)
 
 
 # --- diagrams ---------------------------------------------------------------------------------------------------------
