@@ -5,7 +5,6 @@ import itertools
 import json
 import multiprocessing.connection
 import os
-import runpy
 import signal
 import sys
 import time
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from branches import plot
 from branches.explore.gather import gather
 from branches.export.__main__ import main as export_command
 from branches.graph import closed as diagram
@@ -482,10 +482,10 @@ def test_crossings_of_polylines():
 
 
 @pytest.mark.parametrize("source", ["diagram", "scene"])
-def test_the_pictures(folder, call, tmp_path, root, source):
+def test_the_pictures(folder, call, tmp_path, source):
     (tmp_path / "scene.yaml").write_text(SCENE)
     what = folder if source == "diagram" else "scene.yaml"
-    main = runpy.run_path(str(root / "scripts" / "plot_diagram.py"))["main"]
+    main = plot.main
     done = call(main, what, "--out", "x.svg")
     assert done.returncode == 0, done.err
     assert (tmp_path / "x.svg").stat().st_size > 10_000

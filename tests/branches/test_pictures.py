@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import runpy
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from scipy.interpolate import CubicSpline
 
+from branches import plot
 from branches.draw import strip as draw_strip
 from branches.draw.picture import figure, panel
 from branches.draw.solid import widest
@@ -62,10 +62,10 @@ def test_a_limit_is_said_to_be_the_scenes(tmp_path):
     assert axes.get_title().startswith("flat rod,") and same_color(axes.lines[0].get_color(), colour_of(1))
 
 
-def test_the_script_says_which_family_it_draws(tmp_path, call, root):
+def test_the_script_says_which_family_it_draws(tmp_path, call):
     scene = parse("{m: 1, n: 2, nu: [0.3, 0.31], limits: {kappa_n: [0, 20]}, stride: 50}", "scene")
     run_many(scene, tmp_path / "two", Display(silent=True))
-    main = runpy.run_path(str(root / "scripts" / "plot_diagram.py"))["main"]
+    main = plot.main
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
     assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
     assert call(main, tmp_path / "two", "--out", "x.png", "--plain", "--nu", "0.31").out == "written to x.png\n"
