@@ -184,6 +184,14 @@ def _at(value: Any, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple
 # --- messages -----------------------------------------------------------------------------------------------------
 
 
+#: Words of pydantic, and ours for them.
+_OURS = {
+    "Input should be": "must be", "a valid integer": "a whole number", "a valid boolean": "true or false",
+    "a valid number": "a number", "a valid string": "text", "a valid list": "a list", "a valid dictionary": "`key: value` fields",
+    "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "above", "less than": "below",
+}  # fmt: skip
+
+
 def _where(complaint) -> str:
     return plain(".".join(str(part) for part in complaint["loc"] if part != "[key]"))
 
@@ -218,7 +226,8 @@ def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
     elif kind in ("model_type", "dict_type"):
         text = f"{where}: must hold `key: value` fields, not {show(first['input'])}"
     else:
-        message = message.replace("Input should be", "must be")
+        for words, ours in _OURS.items():
+            message = message.replace(words, ours)
         text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
         if kind == "literal_error":
             text += meant(str(first["input"]), re.findall("'([^']+)'", first["ctx"]["expected"]))

@@ -42,10 +42,10 @@ BAD = {
     "number beyond all floats": (SCENE + "nu: 1e999\n", ["nu:", "finite", "inf"]),
     "number for text": (SCENE + "title: 3\n", ["title:", "string", "3"]),
     "n = m": ("m: 2\nn: 2\n", ["n = m = 2", "rotation"]),
-    "n < 1": ("m: 1\nn: 0\n", ["n:", "greater than or equal to 1", "not 0"]),
-    "m < 1": ("m: -1\nn: 2\n", ["m:", "greater than or equal to 1", "not -1"]),
-    "nu = -1": (SCENE + "nu: -1\n", ["nu:", "greater than -1", "not -1"]),
-    "nu > 1/2": (SCENE + "nu: 0.6\n", ["nu:", "less than or equal to 0.5", "not 0.6"]),
+    "n < 1": ("m: 1\nn: 0\n", ["n:", "at least 1", "not 0"]),
+    "m < 1": ("m: -1\nn: 2\n", ["m:", "at least 1", "not -1"]),
+    "nu = -1": (SCENE + "nu: -1\n", ["nu:", "above -1", "not -1"]),
+    "nu > 1/2": (SCENE + "nu: 0.6\n", ["nu:", "at most 0.5", "not 0.6"]),
     # the cell does not close if every two-fold axis lies in the mirror plane
     "m / n even": ("m: 4\nn: 2\n", ["m = 4, n = 2", "even"]),
     # 1 + 2 nu (n^2/m^2 - 1) <= 0 in equation (27): the twisting modulus is not positive there
@@ -108,7 +108,7 @@ BAD_SETTINGS = {
     "mesh.=3": "must be key=value", "m=": "--set m=: m:", "m=two": "--set m=two: m:", "m=[": "--set m: not usable YAML",
     "m.x=3": "'m' has no fields", "mesh.degree.x=2": "mesh.degree", "steps=5": "--set steps=5: steps", "m=1=2": "'1=2'",
     "foo.bar=1": "unknown field 'foo'", "__class__=1": "unknown field '__class__'", "m=*a": "aliases", "m=\0": "#x0000",
-    "limits.kappa_n.low=3": "limits.kappa_n", "n=1": "n = m = 1", "nu=nan": "--set nu=nan: nu: must be a valid number",
+    "limits.kappa_n.low=3": "limits.kappa_n", "n=1": "n = m = 1", "nu=nan": "--set nu=nan: nu: must be a number",
 }  # fmt: skip
 
 

@@ -43,7 +43,7 @@ MISTAKES = {
     TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, finish: clamped}"): "stage 2: follow: 'force_width' must be one of",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, numbers: {bend: 1}}"): "stage 2: numbers: 'bend' must be one of",
-    TIP + "roller: {at: 1.5}\n": "roller.at: must be less than 1, not 1.5",
+    TIP + "roller: {at: 1.5}\n": "roller.at: must be below 1, not 1.5",
     TIP + "roller: {at: 0.123456789}\n": "roller: at: 0.123457 must be a multiple of 1/N",
     TIP + "roller: {at: 0.5, held: up}\n": "roller.held: must be width, normal, tangent or three numbers",
     TIP.replace("0.3", "[]"): "material.nu: must be a number, or a list of numbers, not []",

@@ -143,7 +143,7 @@ MISTAKES = {
     "a folder as config": (["."], "cannot read the config '.': it is a folder; a scene is a YAML file"),
     "a device as config": (["/dev/zero"], "megabyte"),
     "unknown field": (["scene.yaml", "--set", "foo=1"], "unknown field 'foo'"),
-    "impossible value": (["scene.yaml", "--set", "nu=0.7"], "--set nu=0.7: nu: must be less than or equal to 0.5, not 0.7"),
+    "impossible value": (["scene.yaml", "--set", "nu=0.7"], "--set nu=0.7: nu: must be at most 0.5, not 0.7"),
     "n = m": (["scene.yaml", "--set", "n=1"], "n = m = 1 is a rigid rotation"),
     "m / n even": (["scene.yaml", "--set", "m=4"], "m = 4, n = 2: m / n must not be even"),
     "no threshold": (["scene.yaml", "--set", "nu=-0.5"], "nu = -0.5: no threshold"),
