@@ -187,7 +187,8 @@ def _at(value: Any, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple
 #: Words of pydantic, and ours for them.
 _OURS = {
     "Input should be": "must be", "a valid integer": "a whole number", "a valid boolean": "true or false",
-    "a valid number": "a number", "a valid string": "text", "a valid list": "a list", "a valid dictionary": "`key: value` fields",
+    "a valid number": "a number", "a valid string": "text", "a valid list": "a list",
+    "a valid dictionary": "`key: value` fields",
     "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "above", "less than": "below",
 }  # fmt: skip
 
