@@ -44,12 +44,11 @@ class AlgebraicProblem(Restated):
         Number of equations of a residual that fills an array; as many as states by default.
     jacobian : callable, optional
         ``jacobian(u, p)``, with the arguments of the residual, returns the derivatives by the states: an array (equations,
-        states) or a sparse matrix of SciPy. It is called in Python. Derivatives by parameters are still found.
+        states) or a sparse matrix of SciPy. It is called in Python, and compared with differences of the residual once, near
+        the first solution. Derivatives by parameters are still found.
     angles : sequence of str, or mapping of str to float, optional
         States in which the residual is periodic, with the period 2 pi or, in a mapping, any other. Solutions that differ by
         whole rounds are the same: a branch that comes back one round on is closed.
-
-    A Jacobian is compared with differences of the residual once, near the first solution.
 
     Raises
     ------

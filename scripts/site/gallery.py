@@ -14,6 +14,7 @@ import contextlib
 import hashlib
 import io
 import json
+import logging
 import os
 import runpy
 import subprocess
@@ -32,6 +33,8 @@ STYLE = {
     "axes.prop_cycle": f"cycler('color', {[*map(str, PALETTE)]})", "axes.spines.top": False, "axes.spines.right": False,
     "axes.titlesize": 10.5, "lines.linewidth": 1.6, "legend.frameon": False,
 }  # fmt: skip
+#: What mkdocs shows while it builds.
+LOG = logging.getLogger("mkdocs.hooks.gallery")
 #: What stands in the overview where the thumbnails go.
 PLACE = "<!-- thumbnails -->"
 
@@ -68,6 +71,7 @@ def result(name: str) -> Path:
             from mkdocs.exceptions import PluginError
 
             raise PluginError(f"{script.relative_to(ROOT)} failed: {done.stderr.strip()}")
+        LOG.info("ran %s", script.relative_to(ROOT))
     return folder
 
 
@@ -84,6 +88,7 @@ def on_files(files: Any, config: Any) -> Any:
     groups = fields(config.nav)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         names = [name for group in groups.values() for name in group]
+        LOG.info("gallery: scripts that have changed are run, %d in all", len(names))
         folders = dict(zip(names, pool.map(result, names)))
     for name, folder in folders.items():
         files.append(File.generated(config, f"gallery/{name}.md", content=page(name, folder)))
