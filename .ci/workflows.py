@@ -102,6 +102,8 @@ def run(job: dict, values: dict, artifacts: Path, log: Path) -> bool:
         given = {name: filled(text, values) for name, text in job.get("env", {}).items()}
         for step in (step for step in job["steps"] if wanted(step, values)):
             uses = step.get("uses", "")
+            if "sparse-checkout" in step.get("with", {}):
+                command("git", "sparse-checkout", "set", *step["with"]["sparse-checkout"].split())
             if "run" in step:
                 print("$", filled(step["run"], values), file=out, flush=True)
                 if not command("bash", "-e", "-o", "pipefail", "-c", filled(step["run"], values), **given):
