@@ -1,6 +1,7 @@
-"""The code in docs/ runs as written, block after block: Python, and commands of this project (file-format.md: in test_store).
+"""The code in docs/ runs as written, block after block: Python, and commands of this project.
 
-Left out: commands of other programs (a browser, apt), finite elements, which take many minutes, and what test_strip runs.
+Left out: commands of other programs (a browser, apt), finite elements, which take many minutes, and what test_strip,
+test_store (file-format.md) and test_other_programs (from-auto.md, from-xppaut.md) run.
 """
 
 import importlib
@@ -15,7 +16,11 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).resolve().parent.parent
-PAGES = [page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem != "file-format"]
+#: Pages that other tests run.
+RUN_ELSEWHERE = {"file-format", "from-auto", "from-xppaut"}
+PAGES = [
+    page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem not in RUN_ELSEWHERE
+]
 PROGRAM = ".venv/bin/python "
 ELSEWHERE = re.compile(r"-m branches\.(shell|strip|paper .*fig7)")
 #: Programs that have run as a process of their own, as users start them; from then on they are called.

@@ -1,13 +1,29 @@
 """Branches in files."""
 
 import json
+import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bank.closed_forms import elastica, parabola
 
-from contin import AlgebraicProblem, CycleProblem, MapProblem, ProblemError, load, save, solve, trace
+from contin import (
+    AlgebraicProblem,
+    BoundaryValueProblem,
+    CycleProblem,
+    MapProblem,
+    ProblemError,
+    curve,
+    load,
+    save,
+    solve,
+    trace,
+)
 from contin.lowlevel import read_columns
+
+#: Files that version 0.2.0 wrote.
+KEPT = Path(__file__).parent / "kept"
 
 
 def test_a_stored_branch_point_can_be_left_again(tmp_path):
@@ -65,26 +81,39 @@ def test_the_kind_and_the_symmetry_are_compared(tmp_path):
         load(plain, tmp_path / "b")
 
 
-def test_files_of_version_2(tmp_path):
-    """Version 0.2 left out what is new since; files of other versions are refused."""
+def test_files_of_version_2_open_and_go_on():
+    """Branches that version 0.2.0 wrote: a thermal explosion, and equilibria and cycles of van der Pol's oscillator."""
+
+    def oscillator(u, p):
+        return u.y, p.m * u.y - u.x**2 * u.y - u.x
+
+    explosion = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * math.exp(u.u / (1 + p.eps * u.u))), lambda a, b, p: (a.u, b.u), ["u", "v"],
+        {"lam": 0.0, "eps": 0.2}, functionals={"mean": lambda t, u, p: u.u},
+    )  # fmt: skip
+    heat = load(explosion, KEPT / "bvp.npz")
+    assert [point.label for point in heat if point.label] == ["EP", "UZ", "LP", "EP"]
+    assert read_columns(KEPT / "bvp.npz").columns["lam"].tolist() == heat["lam"].tolist()
+    assert trace(heat[-1], limits={"mean": (-1, 20), "lam": (0, 10)}).labelled("LP")
+    (cusp,) = curve(heat.labelled("LP")[0], "eps", limits={"eps": (0.2, 0.26)}).labelled("CP")
+    assert cusp["eps"] == pytest.approx(0.2457804, abs=1e-6)  # docs/contin.md
+
+    rest = load(AlgebraicProblem(oscillator, ["x", "y"], {"m": -1.0}), KEPT / "rest.npz")
+    cycles = load(CycleProblem(oscillator, ["x", "y"], {"m": -1.0}), KEPT / "cycles.npz")
+    more = trace(cycles[-1], limits={"m": (-1, 1.5)})
+    anew = trace(rest.labelled("HB")[0], branch=1, limits={"m": (-1, 1.5)})
+    assert str(more.stop) == str(anew.stop) == "reached m = 1.5"
+    assert more[-1]["period"] == pytest.approx(anew[-1]["period"], abs=1e-9)
+
+
+def test_files_of_other_versions_are_refused(tmp_path):
     problem = parabola()
-    branch = trace(solve(problem, [1.0]), free=["mu"], direction=-1, limits={"mu": (-1, 2)})
-    save(branch, tmp_path / "a.npz")
+    save(trace(solve(problem, [1.0]), free=["mu"], max_points=2), tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as file:
         arrays = {name: file[name] for name in file.files}
     head = json.loads(arrays.pop("head").tobytes())
-    for row in head["points"]:
-        for name in ("column", "value", "discretization_error"):
-            del row[name]
-    for name in ("notes", "curves", "further", "kind", "symmetry"):
-        del head[name]
-    for version in (1, 0):
-        text = json.dumps(head | {"format": f"contin branch {version}"}).encode()
-        np.savez(tmp_path / f"{version}.npz", head=np.frombuffer(text, dtype=np.uint8), **arrays)
-    again = load(problem, tmp_path / "1.npz")
-    assert [(point.label, *point.x) for point in again] == [(point.label, *point.x) for point in branch]
-    assert again.labelled("LP")[0].column == "mu" and str(again.stop) == str(branch.stop)
-    assert read_columns(tmp_path / "1.npz").columns["mu"].tolist() == branch["mu"].tolist()
+    text = json.dumps(head | {"format": "contin branch 0"}).encode()
+    np.savez(tmp_path / "0.npz", head=np.frombuffer(text, dtype=np.uint8), **arrays)
     with pytest.raises(ProblemError, match="no branch stored"):
         load(problem, tmp_path / "0.npz")
 
