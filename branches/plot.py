@@ -39,7 +39,9 @@ def parser() -> Parser:
         "is horizontal; closed ones at an angle, -45 32)",
     )  # fmt: skip
     diagram = parser.add_argument_group("a diagram")
-    diagram.add_argument("--window", nargs=2, type=float, default=(-8.0, 14.0), metavar=("LOW", "HIGH"), help="of kappa_n")
+    diagram.add_argument(
+        "--window", nargs=2, type=float, metavar=("LOW", "HIGH"),
+        help="of kappa_n (default: the part of -8 to 14 in which special points are)")  # fmt: skip
     diagram.add_argument("--law", help="which law, where the diagram has several")
     diagram.add_argument("--nu", type=float, help="which nu, where the diagram has several")
     diagram.add_argument("--plain", action="store_true", help="only in conjugate coordinates, not disentangled beside")
@@ -69,7 +71,7 @@ def _check(options) -> None:
         raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
     if options.width is not None and not 0 < options.width <= 2:
         raise ValueError(f"--width {options.width:g}: must lie between 0 and 2")
-    if not options.window[0] < options.window[1]:
+    if options.window and not options.window[0] < options.window[1]:
         raise ValueError(f"--window {options.window[0]:g} {options.window[1]:g}: the first number must be the smaller")
 
 
@@ -94,7 +96,7 @@ def _diagram(options, path: Path):
     out = Path(options.out) if options.out else path / "diagram.pdf" if path.is_dir() else Path(f"{path.stem}.pdf")
     graph = read_closed(path) if path.is_dir() else read(path)
     law, nu, more = choose(graph, options.law, options.nu)
-    return (lambda: figure(graph, law, nu, tuple(options.window), not options.plain)), out, more
+    return (lambda: figure(graph, law, nu, options.window, not options.plain)), out, more
 
 
 def choose(graph, law, nu):

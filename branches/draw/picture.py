@@ -9,6 +9,7 @@ import numpy as np
 
 from branches.draw.strip import View, draw_strip, reach_of
 from branches.draw.style import LINES, OTHER, UNKNOWN, in_words, smooth
+from branches.scene.labels import END
 
 #: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
 _PANELS = 4
@@ -170,7 +171,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
 def _mark(axes, mark, place, seen: set) -> None:
     """Draw the mark of a labelled point, with a word for the legend where it has none yet, and its text."""
     fill = "white" if mark.open else mark.label.colour  # open: the branch goes on there
-    colours = {"color": fill} if mark.label.marker == "x" else {"facecolor": fill, "edgecolor": mark.label.colour}
+    colours = {"color": fill} if mark.label.marker == "x" else {"facecolor": fill, "edgecolor": END}
     axes.scatter(*place, marker=mark.label.marker, s=mark.label.size, zorder=3, label=_once(mark.word, seen), **colours)
 
 

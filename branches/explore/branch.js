@@ -121,7 +121,9 @@ class Branch {
     const near = Math.round(s);
     if (Math.abs(s - near) < 1e-6) return index[near] === -1 ? null : index[near];
     const ends = [index[Math.floor(s)], index[Math.ceil(s)]].filter((value) => value !== -1);
-    return ends.length ? ends[0] : null;
+    if (ends.length) return ends[0];
+    const { index_after = null } = (this.marks || []).find(({ point }) => point === Math.floor(s)) || {}; // between two special points
+    return index_after;
   }
 
   /** The branch as a line in the plane of two columns, smooth between the points. */

@@ -72,6 +72,8 @@ def _branch(path: Path, branch: StoredBranch, let_go: bool) -> dict:
     for mark, event in zip(marks, branch.events):
         if let_go and mark["kind"] == "fold" and (way := way_down(branch, event)):
             mark["way"] = way
+        if "index_after" in event.dtype.names and event["index_after"] >= 0:
+            mark["index_after"] = int(event["index_after"])
     about = {
         "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(branch.scene),
         "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),

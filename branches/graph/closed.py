@@ -15,7 +15,7 @@ import numpy as np
 from branches.graph.interpolation import places
 from branches.graph.stored import CLOSED_FORMAT, COLUMNS
 from branches.scene.closed import ClosedScene, law_of
-from branches.scene.labels import SPECIAL, common_index, kind_of
+from branches.scene.labels import SPECIAL, kind_of
 from contin.lowlevel import exact_text
 from ribbon_model.linear import circle, covering
 
@@ -111,7 +111,7 @@ def _pieces_of(branch, special: list) -> list[dict]:
         if branch.config["origin"]:
             piece["force"] = np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()
         if "index" in rows.dtype.names:
-            piece["index"] = common_index(rows["index"])
+            piece["index"] = branch.index_on(np.arange(first["point"], last["point"] + 1))
         found.append(piece)
     return found
 

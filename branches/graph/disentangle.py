@@ -29,9 +29,13 @@ _LEVELS, _BEYOND = 8, 4
 _TRIALS, _AGAIN = 100, 4
 #: Costs beside that of a crossing, 1: of two branches at one level of a column, at neighbouring levels, and of climbing.
 _TOUCHING, _NEAR, _CLIMB = 0.3, 0.02, 0.02
-#: Rounds of straightening, by how much each exceeds the way to a straight line, and the distance that branches keep above a
-#: column, relative to that of circles.
-_STRAIGHTENED, _BEYOND_STRAIGHT, _APART = 50, 1.5, 0.08
+#: Rounds of straightening, and by how much each exceeds the way to a straight line.
+_STRAIGHTENED, _BEYOND_STRAIGHT = 80, 1.5
+#: The distance that branches and ends of branches keep above a column, relative to that of circles; less where many share the
+#: room. With half of it branches seem to touch ends of others; with twice as much they go far out of their way.
+_APART = 0.13
+#: The distance that branches keep from circles above a column, relative to that of circles: a line does not lie on a circle.
+_CLEAR = 0.06
 #: Steps in kappa_n smaller than this are rounding errors of the splines, and columns closer than the second number are one.
 _STILL, _SAME = 1e-4, 1e-4
 _OUTSIDE, _NOBODY = -1, np.zeros((0, 2))
@@ -262,9 +266,12 @@ def _crossed(levels, pairs, rightwards) -> np.ndarray:
 def _straighten(courses, columns, circles) -> None:
     """Move every height towards the straight line between its neighbours, as far as the order above its column allows.
 
+    Heights above a column keep a distance, or share what room there is.
+
     At the sides of the window, where a branch may end, the circles count as branches: none leaves on top of a circle.
     """
-    apart, sides = _APART * np.diff(circles).min(initial=2.0), (0, len(columns) - 1)
+    spacing, sides = np.diff(circles).min(initial=2.0), (0, len(columns) - 1)
+    square = np.ptp(columns) / (np.ptp(circles) + spacing)
     above = {column: circles.tolist() if column in sides else [] for column in range(len(columns))}
     slots = []
     for course in courses:
@@ -278,23 +285,37 @@ def _straighten(courses, columns, circles) -> None:
             for t in range(1, len(course.column) - (course.ends[1] is not None)):
                 column = course.column[t]
                 if column != _OUTSIDE:
-                    course.height[t] = above[column][own[t]] = _straighter(course, t, columns, above[column], apart)
+                    goal = _straighter(course, t, columns, above[column], _APART * spacing, square)
+                    course.height[t] = above[column][own[t]] = _beside(goal, course.height[t], circles, _CLEAR * spacing)
 
 
-def _straighter(course: Course, t: int, columns, beside, apart: float) -> float:
-    """A height nearer to the straight line between the places before and after it that are seen."""
+def _straighter(course: Course, t: int, columns, beside, apart: float, square: float) -> float:
+    """A height nearer to the straight line between the places before and after it that are seen, apart from those beside it.
+
+    ``square`` is the height of the picture over its width, in its units: where the branch is steep, others have to be farther
+    above or below it to be as far from it.
+    """
     height, column, here = course.height, course.column, course.height[t]
     linked = [k for k in (t - 1, t + 1) if k < len(height) and course.seen[min(k, t)]]
     if not linked:
         return here
-    near = [1 / abs(columns[column[k]] - columns[column[t]]) for k in linked]
+    steps = [columns[column[k]] - columns[column[t]] for k in linked]
+    near = [1 / abs(step) for step in steps]
     straight = sum(weight * height[k] for weight, k in zip(near, linked)) / sum(near)
+    apart *= math.hypot(1, square * min(abs((height[k] - here) / step) for k, step in zip(linked, steps)))
     goal = here + _BEYOND_STRAIGHT * (straight - here)
+    low, high = beside[beside < here].max(initial=-np.inf), beside[beside > here].min(initial=np.inf)
+    goal = (low + high) / 2 if high - low < 2 * apart else min(max(goal, low + apart), high - apart)
     if course.sense:
         ends = sorted((height[t - 1], height[t + 1] if t + 1 < len(height) else course.sense * np.inf))
         goal = min(max(goal, ends[0]), ends[1])
-    low, high = beside[beside < here].max(initial=-np.inf), beside[beside > here].min(initial=np.inf)
-    return min(max(goal, min(here, low + apart)), max(here, high - apart))
+    return goal if low < goal < high else here
+
+
+def _beside(goal: float, here: float, circles, clear: float) -> float:
+    """The height ``goal``, beside a circle on which it would lie; on the side on which the branch is ``here``."""
+    circle = circles[np.argmin(np.abs(circles - goal))]
+    return circle + math.copysign(clear, here - circle) if abs(goal - circle) < clear and here != circle else goal
 
 
 def _along(course: Course, curve) -> np.ndarray:

@@ -10,27 +10,47 @@ import numpy as np
 from branches.draw.style import CONJUGATE, LINES, NATURAL, OTHER, colour_of, in_words, smooth
 from branches.graph import disentangle as layered
 from branches.graph.closed import families, pieces, secondaries
-from branches.scene.labels import END, FOLD, MARKS, SECONDARY
+from branches.graph.names import name_lines
+from branches.scene.labels import END, MARKS
 
 STABLE, UNSTABLE = "#000000", "#8a8a8a"
+#: The part of kappa_n that pictures of the diagram show at most, and the margin around special points, relative to their range.
+WINDOW, _MARGIN = (-8.0, 14.0), 0.1
+#: Letters of an entry of the legend beyond which there are three columns, not five.
+_LONG = 30
+#: Bifurcations of one circle closer than this part of the window are one blob; of so many there is an inset, with a margin
+#: around them as a part of their range.
+_BLOB, _MANY, _AROUND = 0.01, 3, 0.3
+#: Heights below the lowest circle that make room for an inset.
+_BELOW = 3.8
+#: Sizes of an inset, the first for which there is room, as parts of the panel; the room for the numbers left of it and below;
+#: and the step of the search for a place.
+_INSETS, _NUMBERS, _SEARCH = ((0.5, 0.21), (0.36, 0.16), (0.3, 0.12)), (0.07, 0.06), 0.02
 #: Colour of secondary branches, which have no wavenumber.
 _NO_WAVE = "#000000"
 #: Largest step in kappa_n of what is drawn, far less than the diagrams' 22; and into how many parts a step is cut at most.
 _STEP, _MOST_PARTS = 0.05, 200
 #: Marks closer than this to a branch, in (kappa_n, kappa*), are on it: branches are drawn by splines through their points.
 _SAME_PLACE = 1e-3
-#: Widths of branches in a diagram, by the same.
+#: Widths of branches in a diagram, by whether they are stable; None: not known.
 _WIDTHS = {True: 3.4, False: 1.4, None: 1.4}
+#: How circles are drawn.
+_CIRCLES: dict[str, dict] = {
+    "unstable": {"color": UNSTABLE, "lw": 0.9, "ls": LINES[False][0]},
+    "published": {"color": UNSTABLE, "lw": 2.6, "solid_capstyle": "butt"},
+    "stable": {"color": STABLE, "lw": 2.6, "solid_capstyle": "butt"},
+}
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A special point of a branch: where it is in (kappa_n, kappa*), its kind, and the covering index if it is a circle."""
+    """A special point of a branch: where it is in (kappa_n, kappa*), its kind, why a branch ends there; its circle's index."""
 
     kappa_n: float
     kappa_star: float
     kind: str
     covering: int | None
+    what: str = ""
 
 
 @dataclass(frozen=True)
@@ -39,6 +59,8 @@ class Line:
 
     Attributes
     ----------
+    name : str
+        "(m, n)"; empty for a secondary branch.
     n : int
         Wavenumber; 0 for a secondary branch.
     kappa_n, kappa_star : ndarray, shape (K,)
@@ -49,6 +71,7 @@ class Line:
         Its special points, from end to end.
     """
 
+    name: str
     n: int
     kappa_n: np.ndarray
     kappa_star: np.ndarray
@@ -69,15 +92,15 @@ class Line:
             first = last
 
 
-def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = True):
+def figure(graph, law: str, nu: float, window=None, disentangle: bool = True):
     """The diagram of one law and nu.
 
     Parameters
     ----------
     graph : networkx.MultiGraph
         As of `branches.diagram_graph`.
-    window : (float, float)
-        Of kappa_n.
+    window : (float, float), optional
+        Of kappa_n; by default `WINDOW`, or the part of it in which the special points are.
     disentangle : bool
         Add the panel where the heights between the circles are free (`branches.disentangle`).
 
@@ -87,24 +110,137 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
     """
     from matplotlib.figure import Figure
 
-    result = Figure(figsize=(13 if disentangle else 7.5, 7), layout="constrained")
+    found, window = lines(graph, law, nu), window or _window(graph, law, nu)
+    result = Figure(figsize=(13 if disentangle else 7.5, 7.4), layout="constrained")
     panels = result.subplots(1, 2 if disentangle else 1, sharex=True, squeeze=False)[0]
     conjugate(panels[0], graph, law, nu, window)
     panels[0].set_ylabel(CONJUGATE, fontsize=13)
+    drawn = [[line.kappa_star for line in found]]
     if disentangle:
         panels[0].set_title("in conjugate coordinates", fontsize=13)
-        schematic(panels[1], graph, law, nu, window)
+        drawn.append(schematic(panels[1], graph, law, nu, window))
         panels[1].set_ylabel("covering index of the circles (heights between: free)", fontsize=13)
         panels[1].set_title("disentangled", fontsize=13)
     for axes in panels:
         axes.set_xlabel(NATURAL, fontsize=13)
         axes.tick_params(labelsize=12)
-    handles, columns = legend(graph, law, nu), 3
-    if disentangle:
-        columns = 4 if secondaries(graph, law, nu) else 6  # their words are longer
-    result.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=12)
+    handles = legend(graph, law, nu, window)
+    columns = 3 if max(len(handle.get_label()) for handle in handles) > _LONG else 5
+    result.legend(handles=handles, loc="outside lower center", ncols=columns if disentangle else 2, frameon=False, fontsize=12)
     result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {in_words(nu)}{note(graph)}", fontsize=15)
+    blob = _blob(found, window)
+    if blob:  # below the lowest circle there is room
+        panels[0].set_ylim(bottom=panels[0].get_ylim()[0] - _BELOW)
+    result.draw_without_rendering()  # pixels of lines are known from here on
+    result.set_layout_engine("none")
+    taken = [_inset(panels[0], graph, law, nu, found, blob)] if blob else []
+    for axes, heights in zip(panels, drawn):
+        _name(axes, found, heights, _coverings(graph, law, nu), [box for box in taken if box is not None and axes is panels[0]])
     return result
+
+
+def _window(graph, law: str, nu: float) -> tuple[float, float]:
+    """The part of `WINDOW` in which the special points are, and where a circle is stable by the published theory alone."""
+    there = [data["kappa_n"] for _, data in graph.nodes(data=True)
+             if (data["law"], data["nu"]) == (law, nu) and data["kind"] in MARKS]  # fmt: skip
+    there += [end for m in _coverings(graph, law, nu) if m > 0 for end in _published_only(law, nu, m)]
+    there = [kappa_n for kappa_n in there if WINDOW[0] < kappa_n < WINDOW[1]] or list(WINDOW)
+    margin = _MARGIN * (max(there) - min(there)) or 1.0
+    return max(WINDOW[0], min(there) - margin), min(WINDOW[1], max(there) + margin)
+
+
+def _name(axes, found: list[Line], heights, coverings, taken) -> list[str]:
+    """Write the names of the primary lines, on each part of them that is seen; return those for which there is no room."""
+    named, obstacles = [], [(np.array(axes.get_xlim()), np.array([m, m])) for m in coverings]
+    for line, height in zip(found, heights):
+        seen = _within(line.kappa_n, axes.get_xlim()) & _within(height, axes.get_ylim())
+        for part in _runs(seen):
+            (named if line.name else obstacles).append((line.name, line.kappa_n[part], height[part])[0 if line.name else 1 :])
+        marks = [line.place(mark) for mark in line.marks if mark.kind in MARKS]
+        obstacles += [(line.kappa_n[[place]], height[[place]]) for place in marks if seen[place]]
+    return name_lines(axes, named, obstacles, taken)
+
+
+def _runs(seen) -> list[slice]:
+    """Where a line is seen, one part after the other."""
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]]).astype(int)))
+    return [slice(first, last) for first, last in zip(changes[::2], changes[1::2])]
+
+
+def _within(values, ends):
+    return (values >= ends[0]) & (values <= ends[1])
+
+
+# --- an inset ---------------------------------------------------------------------------------------------------------
+
+
+def _blob(found: list[Line], window) -> list[Mark]:
+    """The most bifurcations of one circle inside the window that marks make one blob of; none if they are few."""
+    near = _BLOB * (window[1] - window[0])
+    blobs: list[list[Mark]] = [[]]
+    marks = [mark for line in found for mark in line.marks if mark.kind == "circle" and _within(mark.kappa_n, window)]
+    for mark in sorted(marks, key=lambda mark: (mark.covering, mark.kappa_n)):
+        last = blobs[-1][-1] if blobs[-1] else mark
+        if mark.covering != last.covering or mark.kappa_n - last.kappa_n > near:
+            blobs.append([])
+        blobs[-1].append(mark)
+    most = max(blobs, key=len)
+    return most if len(most) >= _MANY else []
+
+
+def _inset(axes, graph, law: str, nu: float, found: list[Line], blob: list[Mark]):
+    """Draw the blob enlarged where the panel is empty, with names; return the pixels that it takes, None without room."""
+    place = _empty(axes, found, blob)
+    if place is None:
+        return None
+    inset = axes.inset_axes(place, zorder=3)
+    ends = [mark.kappa_n for mark in blob]
+    around = _AROUND * np.ptp(ends)
+    window, here = (
+        (min(ends) - around, max(ends) + around),
+        [line for line in found if any(mark in blob for mark in line.marks)],
+    )
+    circles(inset, graph, law, nu, window)
+    for line in here:
+        _draw(inset, line, line.kappa_star)
+    heights = [_first_rise(line, next(mark for mark in line.marks if mark in blob), window) for line in here]
+    low, high = (np.median([extreme(height) for height in heights]) for extreme in (np.min, np.max))  # the steepest leave it
+    inset.set(xlim=window, ylim=(low - 0.12 * (high - low), high))
+    inset.tick_params(labelsize=9)
+    inset.locator_params(nbins=4)
+    axes.indicate_inset_zoom(inset, edgecolor=OTHER, alpha=0.6)
+    _name(inset, here, [line.kappa_star for line in here], {blob[0].covering}, [])
+    return inset.get_tightbbox()
+
+
+def _first_rise(line: Line, mark: Mark, window) -> np.ndarray:
+    """kappa* of a line from a mark on, as long as it stays in the window of kappa_n."""
+    place = line.place(mark)
+    away = slice(place, None) if place < len(line.kappa_n) / 2 else slice(place, None, -1)
+    inside = _within(line.kappa_n[away], window)
+    return line.kappa_star[away][: int(np.argmin(inside)) or None]
+
+
+def _empty(axes, found: list[Line], blob: list[Mark]) -> tuple[float, float, float, float] | None:
+    """The place of an inset, as parts of the panel: of the largest size for which there is one, the nearest to the blob."""
+    to_panel = axes.transData + axes.transAxes.inverted()
+    points = np.concatenate([np.column_stack([line.kappa_n, line.kappa_star]) for line in found])
+    sizes = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"]  # stable circles are in the way, too
+    ends = [np.linspace(a, b, 200) for a, b in (xy for xy in sizes if len(xy) == 2)]
+    points = to_panel.transform(np.concatenate([points, *ends]))
+    here = to_panel.transform([(blob[0].kappa_n, blob[0].kappa_star)])[0]
+    for width, height in _INSETS:
+        corners = np.stack(np.meshgrid(np.arange(_NUMBERS[0], 0.98 - width, _SEARCH),
+                                       np.arange(_NUMBERS[1], 0.98 - height, _SEARCH)), axis=-1).reshape(-1, 2)  # fmt: skip
+        low, high = corners - _NUMBERS, corners + (width, height)
+        free = ~((points[:, None] > low) & (points[:, None] < high)).all(axis=2).any(axis=0)
+        if free.any():
+            x, y = min(corners[free].tolist(), key=lambda corner: np.hypot(*(corner + np.array([width, height]) / 2 - here)))
+            return x, y, width, height
+    return None
+
+
+# --- panels -----------------------------------------------------------------------------------------------------------
 
 
 def note(graph) -> str:
@@ -121,14 +257,16 @@ def conjugate(axes, graph, law: str, nu: float, window) -> None:
     _frame(axes, graph, law, nu, window)
 
 
-def schematic(axes, graph, law: str, nu: float, window) -> None:
-    """Draw the branches with free heights, chosen so that few cross, and the circles at their covering indices."""
+def schematic(axes, graph, law: str, nu: float, window) -> list[np.ndarray]:
+    """Draw the branches with free heights, chosen so that few cross, and the circles at their covering indices; the heights."""
     circles(axes, graph, law, nu, window, level=True)
     found = lines(graph, law, nu)
-    for line, height in zip(found, heights(found, window)):
+    drawn = heights(found, window)
+    for line, height in zip(found, drawn):
         _draw(axes, line, height)
     _frame(axes, graph, law, nu, window)
     axes.set_yticks(_coverings(graph, law, nu))
+    return drawn
 
 
 def heights(found: list[Line], window) -> list[np.ndarray]:
@@ -167,8 +305,9 @@ def _draw(axes, line: Line, height) -> None:
         axes.plot(line.kappa_n[part], height[part], color=colour, zorder=2, **style)
     for mark in line.marks:
         if mark.kind in MARKS:
-            marker, colour, size = MARKS[mark.kind]
-            axes.scatter(mark.kappa_n, height[line.place(mark)], marker=marker, color=colour, s=size, zorder=3, linewidths=0)
+            marker, colour, size, _ = MARKS[mark.kind]
+            edge = {} if marker == "x" else {"edgecolors": END, "linewidths": 0.7}
+            axes.scatter(mark.kappa_n, height[line.place(mark)], marker=marker, color=colour, s=size, zorder=3, **edge)
 
 
 def _frame(axes, graph, law, nu, window):
@@ -184,38 +323,54 @@ def _coverings(graph, law, nu):
 
 
 def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> None:
-    """The planar circles, solid where the published linear theory has them stable, dashed elsewhere; all level if asked for."""
+    """The planar circles, all level if asked for.
+
+    They are thick and solid where their energy is a minimum, and dashed elsewhere; thin and solid where the published linear
+    theory alone has them stable.
+    """
     from branches.scene.closed import law_of
-    from ribbon_model.linear import circle, stability_interval
+    from ribbon_model.linear import circle, energy_interval
 
     material, parameters = law_of(law, nu)
 
     def plot(m, ends, **style):
+        ends = np.clip(ends, *window)
         height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in ends]
         axes.plot(ends, height, zorder=1, **style)
 
     for m in _coverings(graph, law, nu):
-        plot(m, window, color=UNSTABLE, lw=0.9, ls=LINES[False][0])
-        if m < 1:  # curled against its natural curvature: the published intervals do not speak of these
-            continue
-        low, high = stability_interval(material, m, parameters)
-        ends = [max(window[0], m * low), min(window[1], m * high)]
-        plot(m, ends, color=STABLE, lw=2.6, solid_capstyle="butt")
+        plot(m, window, **_CIRCLES["unstable"])
+        if m >= 1:  # of those curled against their natural curvature the linear theory does not speak
+            plot(m, m * np.array(energy_interval(material, m, parameters)), **_CIRCLES["stable"])
+            if published := _published_only(law, nu, m):
+                plot(m, published, **_CIRCLES["published"])
 
 
-def legend(graph, law: str, nu: float) -> list:
-    """Handles for the wavenumbers, the stability and the marks that the diagram has."""
+def _published_only(law: str, nu: float, m: int) -> tuple[float, ...]:
+    """The ends of the kappa_n at which the published theory has a circle stable, but its energy is no minimum; or nothing."""
+    from branches.scene.closed import law_of
+    from ribbon_model.linear import energy_interval, stability_interval
+
+    material, parameters = law_of(law, nu)
+    published, energy = (interval(material, m, parameters)[0] for interval in (stability_interval, energy_interval))
+    return (m * published, m * energy) if published < energy else ()
+
+
+def legend(graph, law: str, nu: float, window=WINDOW) -> list:
+    """Handles for the wavenumbers, the stability and the marks that the diagram has inside the window."""
     from matplotlib.lines import Line2D
 
-    waves = sorted({family[3] for family in families(graph) if family[:2] == (law, nu)})
-    handles = [Line2D([], [], color=colour_of(n), lw=2, label=f"n = {n}") for n in waves]
-    handles += [
-        Line2D([], [], color=STABLE, lw=2.6, label="circle, stable"),
-        Line2D([], [], color=UNSTABLE, lw=0.9, ls=LINES[False][0], label="circle, unstable"),
-    ]
-    found = lines(graph, law, nu)
-    known = {stable for line in found for stable, _ in line.parts()}
-    words = {True: "branch, stable", False: "branch, unstable", None: "branch, stability not computed"}
+    found = [line for line in lines(graph, law, nu) if np.any(_within(line.kappa_n, window))]
+    handles = [Line2D([], [], color=colour_of(n), lw=2, label=f"n = {n}") for n in sorted({line.n for line in found} - {0})]
+    published = any(_published_only(law, nu, m) for m in _coverings(graph, law, nu) if m >= 1)
+    words = {
+        "stable": "circle, stable (a minimum of the energy)" if published else "circle, stable",
+        "unstable": "circle, unstable",
+    }
+    words |= {"published": "circle, stable to waves, but it turns inside out"} if published else {}
+    handles += [Line2D([], [], **_CIRCLES[kind], label=text) for kind, text in words.items()]
+    known = {stable for line in found for stable, part in line.parts() if np.any(_within(line.kappa_n[part], window))}
+    words = {True: "branch, stable", False: "branch, unstable", None: "branch, stability not known"}
     handles += [
         Line2D([], [], color=OTHER, ls=LINES[stable][0], lw=_WIDTHS[stable], label=text)
         for stable, text in words.items()
@@ -223,10 +378,12 @@ def legend(graph, law: str, nu: float) -> list:
     ]
     if any(not line.n for line in found):
         handles.append(Line2D([], [], color=_NO_WAVE, lw=2, label="secondary branch"))
-    kinds = {mark.kind for line in found for mark in line.marks}
-    marks = (("circle", "o", END, 5, "bifurcation of a circle"), ("fold", "*", FOLD, 11, "fold"),
-             ("secondary bifurcation", "D", SECONDARY, 6, "secondary bifurcation"))  # fmt: skip
-    handles += [Line2D([], [], marker=m, color=c, ls="", ms=size, label=text) for k, m, c, size, text in marks if k in kinds]
+    seen = {(mark.kind, mark.what) for line in found for mark in line.marks if _within(mark.kappa_n, window)}
+    for kind, (marker, colour, size, text) in MARKS.items():
+        for what in sorted(what for one, what in seen if one == kind):
+            edge = {} if marker == "x" else {"markeredgecolor": END, "markeredgewidth": 0.7}
+            label = text.format(what)
+            handles.append(Line2D([], [], marker=marker, color=colour, ls="", ms=size**0.5, label=label, **edge))
     return handles
 
 
@@ -235,25 +392,35 @@ def legend(graph, law: str, nu: float) -> list:
 
 def lines(graph, law: str, nu: float) -> list[Line]:
     """The branches of one law and nu, smooth from end to end: the primary ones by wavenumber, then the secondary ones."""
-    primary = [_line(graph, family[3], pieces(graph, family)) for family in families(graph) if family[:2] == (law, nu)]
-    secondary = [_line(graph, 0, branch["edges"]) for branch in secondaries(graph, law, nu)]
+    primary = [_line(graph, *family[2:4], pieces(graph, family)) for family in families(graph) if family[:2] == (law, nu)]
+    secondary = [_line(graph, 0, 0, branch["edges"]) for branch in secondaries(graph, law, nu)]
     return sorted(primary, key=lambda line: (line.n, line.marks[0].covering, line.marks[0].kappa_n)) + secondary
 
 
-def _line(graph, n: int, edges) -> Line:
+def _line(graph, m: int, n: int, edges) -> Line:
     """The branch that these edges make up, end to end."""
+    name = f"({m}, {n})" if n else ""
     s, *columns = (np.concatenate([data[name] for _, _, data in edges]) for name in ("arclength", "kappa_n", "kappa_star"))
     s, kappa_n, kappa_star = smooth(s, s, *columns)
     piece = np.searchsorted([data["arclength"][-1] for _, _, data in edges[:-1]], s)
     index = np.array([data.get("index", -1) for _, _, data in edges])[piece]
     kappa_n, kappa_star, index = _refined(kappa_n, kappa_star, index)
     nodes = (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b)))
-    marks = [Mark(node["kappa_n"], node["kappa_star"], node["kind"], node.get("covering")) for node in nodes]
-    line = Line(n, kappa_n, kappa_star, index, marks)
+    marks = [
+        Mark(
+            node["kappa_n"],
+            node["kappa_star"],
+            node["kind"],
+            node.get("covering"),
+            node["what"] if node["kind"] == "end" else "",
+        )
+        for node in nodes
+    ]
+    line = Line(name, n, kappa_n, kappa_star, index, marks)
     line.marks.sort(key=line.place)
     first, last = line.marks[0].covering, line.marks[-1].covering
     if first is None or (last is not None and last < first):
-        return Line(n, kappa_n[::-1], kappa_star[::-1], index[::-1], marks[::-1])
+        return Line(name, n, kappa_n[::-1], kappa_star[::-1], index[::-1], marks[::-1])
     return line
 
 

@@ -32,7 +32,7 @@ CHECKED = (10.0, 100.0, 1000.0)
 WINDOW, _TOP = (-8.0, 14.0), 14.0
 SCENE = (
     f"{{title: Fig. 12a at several widths, law: [ribbon, finite width], Gamma: [{', '.join(map(str, GAMMAS))}], nu: {NU}, "
-    "m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], limits: {kappa_n: [-30, 40]}, stride: 50}"
+    "m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], limits: {kappa_n: [-30, 40]}, stability: true, stride: 50}"
 )
 
 
@@ -56,7 +56,8 @@ def finite_width(folder: Path) -> Section:
         f"The folds at Γ = {', '.join(f'{G:g}' for G in CHECKED)} by collocation, on the curve in two parameters, are "
         f"{worst:.0e} from those of the exact quadrature.",
         "Below its birth (1, 2) leaves the single loop downwards, as a rod's branch does; above upwards, as the ribbon's.",
-        "Branches that end inside the picture end where the strain energy is no longer convex (see docs/finite-width.md).",
+        "A cross marks where a line ends inside the picture: the strain energy is no longer convex there, so the law ends (see "
+        "docs/finite-width.md). Thick lines are stable.",
     ]
     run_many(parse(SCENE, "finite-width"), folder / "finite_width", Display(quiet=True))
     graph = read(folder / "finite_width")
@@ -136,11 +137,12 @@ def _draw_diagrams(graph, folder: Path) -> str:
 
     figure = Figure(figsize=(15, 6), layout="constrained")
     panels = figure.subplots(1, len(GAMMAS) + 1, sharex=True, sharey=True)
-    for axes, Gamma in zip(panels, (*GAMMAS, None)):
-        name = label("ribbon") if Gamma is None else label("finite width", Gamma)
+    names = [*(label("finite width", Gamma) for Gamma in GAMMAS), label("ribbon")]
+    for axes, name, Gamma in zip(panels, names, (*GAMMAS, None)):
         conjugate(axes, graph, name, NU, WINDOW)
         axes.set(title="ribbon, Γ = ∞" if Gamma is None else f"Γ = {Gamma:g}", xlabel=NATURAL)
         axes.label_outer()
     panels[0].set_ylabel(CONJUGATE)
-    figure.legend(handles=legend(graph, "ribbon", NU), loc="outside lower center", ncols=8, frameon=False)
+    handles = {handle.get_label(): handle for name in names for handle in legend(graph, name, NU, WINDOW)}
+    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=8, frameon=False)
     return keep(figure, folder, "finite_width_fig12a")

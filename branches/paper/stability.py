@@ -6,33 +6,23 @@ import math
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from branches.graph import closed as diagram
-from branches.graph.stored import new_graph, read
-from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
+from branches.paper.diagram import LAWS, NU, computed
 from branches.paper.draw import BUCKLED, STABLE, keep
 from branches.paper.page import Row, Section
-from branches.run.display import Display
-from branches.run.many import run_many
-from branches.run.runner import whole_branch
-from branches.scene.parse import parse
-from branches.store.read import read_branch
 from ribbon_model.laws import LAWS as LAW_OBJECTS
 from ribbon_model.linear import energy_interval
 from ribbon_model.linear import index as index_of_circle
 
 COVERINGS = (1, 3, 5, 7)
-#: A solution of every so many points is looked at.
-STRIDE = 3
+WINDOW = (-8.0, 14.0)
 
 
 def fig12b(folder: Path) -> Section:
     """Intervals of kappa_n with stable states, for the three laws."""
-    scene = parse(FIG12.replace("stride: 20", f"stride: {STRIDE}"), "fig12b")
-    run_many(scene, folder / "fig12b", Display(quiet=True))
-    graph = read(folder / "fig12b")
-    found = {law: _stable_pieces(graph, folder / "fig12b", law) for law in LAWS}
+    graph = computed(folder)
+    found = {law: _stable_pieces(graph, law) for law in LAWS}
     rows = []
     for law in LAWS:
         for m in COVERINGS:
@@ -45,9 +35,8 @@ def fig12b(folder: Path) -> Section:
             words = [", ".join(_interval(*piece) for piece in pieces) or "none" for pieces in (guess, ours)]
             rows.append(Row(f"{law}: branch {branch} stable for κₙL/2π in", words[0], words[1], remark))
     notes = [
-        f"The index (negative directions of the energy on closed perturbations) is computed at every {STRIDE}rd point of every "
-        f"branch with {WINDOW[0]:g} ≤ κₙL/2π ≤ {WINDOW[1]:g}; it is 0 on the pieces shown and nowhere else. Their ends are "
-        "folds, circles, and secondary bifurcations, each located.",
+        "The index (negative directions of the energy on closed perturbations) is computed at every point of every branch; it "
+        "is 0 on the pieces shown and nowhere else. Their ends are folds, circles, and secondary bifurcations, each located.",
         "'Published' is the paper's rule applied to these branches: stable past a supercritical pitchfork of a stable circle, "
         "up to the first fold; unstable past a subcritical one. The paper draws the result for the ribbon only.",
         "No contact, no friction: a multi-covered circle lies in itself.",
@@ -85,49 +74,14 @@ def _guesses(graph, law) -> dict[tuple[int, int], list[tuple[float, float]]]:
     return result
 
 
-def _stable_pieces(graph, folder: Path, law) -> dict[tuple[int, int], list[tuple[float, float]]]:
+def _stable_pieces(graph, law) -> dict[tuple[int, int], list[tuple[float, float]]]:
     """The pieces between special points on which the index is 0, of branches that have any."""
-    result = {}
-    for family in diagram.families(graph):
-        if family[0] != law:
-            continue
-        pieces = [data for _, _, data in graph.edges(data=True) if (data["law"], data["m"], data["n"]) == (law, *family[2:4])]
-        values = _indices(read_branch(folder / pieces[0]["file"]))
-        seen = [_seen(values, data) for data in pieces]
-        if any(0 in indices and indices != {0} for indices in seen):  # it changes between folds: locate where
-            pieces = _with_secondary_bifurcations(folder, *family[:4])
-            seen = [{data["index"]} for data in pieces]
-        stable = [tuple(sorted((d["kappa_n"][0], d["kappa_n"][-1]))) for d, indices in zip(pieces, seen) if indices == {0}]
-        if stable:
-            result[family[2:4]] = stable
-    return result
-
-
-def _seen(values, data) -> set[int]:
-    first, last = data["arclength"][0], data["arclength"][-1]
-    return {value for s, value in values if first < s < last and value is not None}
-
-
-def _with_secondary_bifurcations(folder: Path, law, nu, m, n) -> list[dict]:
-    """The pieces of a branch, cut where its index changes."""
-    path = folder / f"index_{law.replace(' ', '_')}_m{m}_n{n}.h5"
-    scene = f"{{law: {law}, nu: {nu}, m: {m}, n: {n}, stability: true, limits: {{kappa_n: [-100, 100]}}, stride: 50}}"
-    whole_branch(parse(scene, "fig12b"), path, Display(silent=True))
-    graph = new_graph()
-    diagram.add_branch(graph, read_branch(path), path.name)
-    return [data for _, _, data in graph.edges(data=True)]
-
-
-def _indices(branch):
-    """(arclength, index or None where undecided) of kept regular points inside the window."""
-    result = []
-    with threadpool_limits(1, "blas"):
-        for number in branch.kept():
-            row = branch.points[number]
-            if row["label"] == b"" and WINDOW[0] <= row["kappa_n"] <= WINDOW[1]:
-                found = branch.solution(int(number)).index()
-                result.append((row["arclength"], found.index if found.decided else None))
-    return result
+    result: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    for _, _, data in graph.edges(data=True):
+        if data["law"] == law and data["index"] == 0:
+            piece = data["kappa_n"][0], data["kappa_n"][-1]
+            result.setdefault((data["m"], data["n"]), []).append((min(piece), max(piece)))
+    return {branch: sorted(pieces) for branch, pieces in result.items()}
 
 
 def _draw(found, folder: Path) -> str:

@@ -9,7 +9,9 @@ from contin.lowlevel import Colour
 #: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
 #: known: its tolerance is this part of the size of a number.
 _NOTHING = 1e-12
-FOLD, END, USER, SECONDARY = Colour.VERMILION, Colour.BLACK, Colour.GREEN, Colour.PURPLE
+#: Colours of marks, all with black edges. Those of folds and bifurcations are no colour of a wavenumber (`branches.draw.style`);
+#: yellow is Okabe & Ito's, too pale for lines.
+FOLD, END, USER, SECONDARY = "#F0E442", Colour.BLACK, Colour.GREEN, "#BBBBBB"
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,11 @@ CONJUGATE = {
 }  # fmt: skip
 #: Labels of points at which the pieces of a branch begin and end.
 SPECIAL = ("LP", "BP", "SB", "EP", "MX")
-#: Marks of kinds in diagrams: marker, colour, size.
-MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", END, 16), "secondary bifurcation": ("D", SECONDARY, 26)}
+#: Marks of kinds in diagrams: marker, colour, size, words; the words of an end are those of its point.
+MARKS = {
+    "circle": ("o", END, 16, "bifurcation of a circle"), "fold": ("*", FOLD, 110, "fold"),
+    "secondary bifurcation": ("D", SECONDARY, 26, "secondary bifurcation"), "end": ("x", END, 36, "a line ends: {}"),
+}  # fmt: skip
 #: Kinds as the explorer page knows them; the others are 'end'.
 ON_PAGE = {
     "circle": "circle", "fold": "fold", "secondary bifurcation": "secondary", "primary branch": "secondary",
@@ -92,9 +97,3 @@ def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
 def without_round_off(value: float, largest: float) -> float:
     """Return a value of a stage, 0 where it is round-off; ``largest`` is the largest one of the stage."""
     return 0.0 if abs(value) <= _NOTHING * abs(largest) else value
-
-
-def common_index(values) -> int:
-    """Return the index on a piece between special points, or -1 if it is undecided or changes along the piece."""
-    decided = set(values[1:-1][values[1:-1] >= 0].tolist())
-    return decided.pop() if len(decided) == 1 else -1

@@ -172,12 +172,18 @@ class StoredBranch(ABC):
         return found
 
     def index_on(self, rows: np.ndarray) -> int:
-        """Return the index on a piece, that of its points which are not special; -1 if they differ or none is known."""
+        """Return the index on a piece; -1 if it is not the same everywhere, or not known.
+
+        It is that of the points which are not special, or, without any, what was computed just after and before the ends.
+        """
         if "index" not in self.points.dtype.names:
             return -1
         inside = rows[1:-1] if len(rows) > 2 else rows
         regular = [row for row in inside if self.points["label"][row] not in (b"LP", b"BP", b"SB")]
         values = {value for value in self.points["index"][regular].tolist() if value >= 0}
+        if not regular and "index_before" in self.events.dtype.names:
+            sides = ((rows[0], "index_after"), (rows[-1], "index_before"))
+            values = {int(event[side]) for row, side in sides for event in self.events if event["point"] == row} - {-1}
         return int(values.pop()) if len(values) == 1 else -1
 
     def snaps(self) -> list[Snap]:

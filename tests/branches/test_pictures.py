@@ -18,15 +18,17 @@ from branches.draw.style import colour_of
 from branches.export.film import drawn as frames
 from branches.export.film import evenly
 from branches.graph.disentangle import crossings
-from branches.graph.picture import circles, conjugate, heights, legend, lines
+from branches.graph.picture import WINDOW, circles, conjugate, heights, legend, lines
+from branches.graph.picture import figure as diagram_figure
 from branches.graph.preview import preview
-from branches.paper.diagram import FIG12, WINDOW
+from branches.paper.diagram import FIG12
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.many import run_many
 from branches.run.runner import run_scene
 from branches.scene.parse import load, parse
 from branches.store.files import write_picture
+from ribbon_model import exact
 
 
 def branch_of(folder, scene):
@@ -165,7 +167,7 @@ def test_dashes_of_a_diagram_mean_unstable_and_colours_mean_wavenumbers():
     assert styles == [("-", 3.4), ("--", 1.4), ("-", 1.4)]
     assert [same_color(line.get_color(), colour_of(n)) for line, n in zip(branches, (2, 2, 4))] == [True] * 3
     words = [handle.get_label() for handle in legend(graph, "ribbon", 0.3)]
-    assert words[4:7] == ["branch, stable", "branch, unstable", "branch, stability not computed"]
+    assert words[4:7] == ["branch, stable", "branch, unstable", "branch, stability not known"]
 
 
 @pytest.mark.parametrize(
@@ -182,6 +184,83 @@ def test_no_branches_cross_in_the_disentangled_fig12(law, tangled):
     before, after = count([line.kappa_star for line in found]), count(heights(found, WINDOW))
     print(f"{law}: {before} crossings in conjugate coordinates, {after} disentangled")
     assert (before, after) == (tangled, 0)
+
+
+@pytest.fixture(scope="module")
+def previews():
+    """Fig. 12 from the quadratures, by law."""
+    return {law: preview(parse(FIG12, "fig12", [f"law={law}"])) for law in ("ribbon", "isotropic rod")}
+
+
+@pytest.mark.parametrize("law", ["ribbon", "isotropic rod"])
+def test_every_line_of_fig12_has_its_name(law, previews):
+    """In one panel at least; a name stands on no other line, mark or name."""
+    made = diagram_figure(previews[law], law, 0.3)
+    found = [line for line in lines(previews[law], law, 0.3) if np.any(np.abs(line.kappa_n - 3) < 11)]
+    names = {text.get_text() for axes in every_axes(made) for text in axes.texts}
+    assert {line.name for line in found} <= names
+    for axes in every_axes(made):
+        boxes = [text.get_window_extent() for text in axes.texts]
+        assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+        for box in boxes:
+            centre = np.mean(box.get_points(), axis=0)
+            crossing = sum(inside(axes, line, box) for line in axes.lines if len(line.get_xdata()) > 2)
+            own = min(distance(axes, line, centre) for line in axes.lines if len(line.get_xdata()) > 2)
+            assert crossing == (own < 1)  # its own line, or none if a thin line leads to it
+
+
+def every_axes(made):
+    return [axes for panel in made.axes for axes in (panel, *panel.child_axes)]
+
+
+def pixels(axes, line):
+    """Pixels of a drawn line, two apart at most."""
+    found = axes.transData.transform(line.get_xydata())
+    found = found[np.abs(found).max(axis=1) < 1e4]
+    return np.concatenate([np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / 2)) for a, b in itertools.pairwise(found)])
+
+
+def inside(axes, line, box):
+    low, high = box.get_points()
+    found = pixels(axes, line)
+    return bool(((found > low + 1) & (found < high - 1)).all(axis=1).any())
+
+
+def distance(axes, line, place):
+    return np.linalg.norm(pixels(axes, line) - place, axis=1).min()
+
+
+def test_the_inset_shows_the_five_bifurcations_that_are_one_blob(previews):
+    (inset,) = diagram_figure(previews["ribbon"], "ribbon", 0.3).axes[0].child_axes
+    low, high = inset.get_xlim()
+    places = [exact.bifurcation(1, n, 0.3) for n in (3, 4, 5, 6, 7)]
+    assert low < min(places) and max(places) < high < 3.5
+    pixel = [inset.transData.transform((place, 1.0))[0] for place in places]
+    assert min(np.diff(pixel)) > 15  # in the panel they are 1 to 5 pixels apart
+
+
+def test_lines_do_not_touch_what_they_do_not_meet(previews):
+    """At the ends of (3, 4) and (5, 6), (1.79, 5) and (7.44, 5), and beside the circle of (1, 7): by 0.1."""
+    found = lines(previews["ribbon"], "ribbon", 0.3)
+    drawn = dict(zip((line.name for line in found), zip(found, heights(found, WINDOW))))
+    for kappa_n, level, own in ((1.7857, 5, "(3, 4)"), (7.4367, 5, "(5, 6)"), (6.0, 1, "")):
+        for name, (line, height) in drawn.items():
+            near = np.flatnonzero(np.diff(np.sign(line.kappa_n - kappa_n)))
+            assert name == own or all(abs(height[near] - level) > 0.1)
+
+
+def test_a_line_says_why_it_ends():
+    graph = preview(parse("{m: 1, n: 2, limits: {kappa_n: [-20, 20]}}", "scene"))
+    node = next(data for _, data in graph.nodes(data=True) if data["kind"] == "circle" and data["covering"] == 3)
+    node |= {"kind": "end", "what": "the end of the convex strain energy"}
+    del node["covering"]
+    words = [handle.get_label() for handle in legend(graph, "ribbon", 0.3)]
+    assert words[-1] == "a line ends: the end of the convex strain energy"
+
+
+def test_the_legend_of_the_isotropic_rod_says_which_circle_is_stable_and_why(previews):
+    words = [handle.get_label() for handle in legend(previews["isotropic rod"], "isotropic rod", 0.3)]
+    assert "circle, stable (a minimum of the energy)" in words and "circle, stable to waves, but it turns inside out" in words
 
 
 def test_the_title_is_that_of_the_data(tmp_path):
