@@ -9,7 +9,7 @@ from contin.lowlevel import Colour
 #: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
 #: known: its tolerance is this part of the size of a number.
 _NOTHING = 1e-12
-#: Colours of marks, all with black edges. Those of folds and bifurcations are no colour of a wavenumber (`branches.draw.style`);
+#: Colours of marks, all with black edges. Those of folds and bifurcations are of no wavenumber (`branches.draw.style`);
 #: yellow is Okabe & Ito's, too pale for lines.
 FOLD, END, USER, SECONDARY = "#F0E442", Colour.BLACK, Colour.GREEN, "#BBBBBB"
 
