@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin import Settings, trace
-from contin.lowlevel import Collocation, point_of
+from contin.lowlevel import Collocation, point_of, shown
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
 from ribbon_model.law import Law
 from ribbon_model.older import takes_parameters
-from ribbon_model.shown import Shown
 
 #: The free parameters with couples, at fixed kappa_n.
 _FREE = ("M2", "M1", "M3", "R1", "R3")
@@ -31,8 +30,8 @@ _INTERVALS, _DEGREE = 8, 7
 _LARGEST, _MOST = 100.0, 200
 
 
-@dataclass(frozen=True, repr=False)
-class Folding(Shown):
+@dataclass(frozen=True)
+class Folding:
     """The path from a circle to the first free state, with couples at two opposite points.
 
     Attributes
@@ -45,6 +44,8 @@ class Folding(Shown):
     couples: np.ndarray
     angles: np.ndarray
     energies: np.ndarray
+
+    __repr__ = shown
 
     @property
     def peak(self) -> int:

@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
+from contin.lowlevel import shown
 from ribbon_model.older import takes_parameters
 
 #: Derivatives that a law without coupling does not have, relative to the sum of the moduli: they are zeros or round-off.
@@ -74,6 +75,9 @@ class Parameter(NamedTuple):
     width: int = 0
     thickness: int = 0
     stiffness: bool = False
+
+    def __repr__(self) -> str:
+        return shown(self)
 
 
 def _poisson(value: float) -> bool:

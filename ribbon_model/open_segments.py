@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contin.lowlevel import Collocation
+from contin.lowlevel import Collocation, shown
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMPED, HINGED, JOINT, PLACE
 from ribbon_model.loads import FORCES, STROKE
@@ -24,14 +24,13 @@ from ribbon_model.open_strip import OpenStrip
 from ribbon_model.second_variation import cross_matrix
 from ribbon_model.segments import Chain
 from ribbon_model.shape import frames
-from ribbon_model.shown import Shown
 
 #: Tolerance of the conditions at the last end, the most Newton steps to it, and a violation from which none leads back.
 _HELD, _STEPS, _FAR = 1e-12, 12, 1.0
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class OpenChain(Shown, Chain):
+@dataclass(frozen=True, eq=False)
+class OpenChain(Chain):
     """An open strip of N segments; length 1.
 
     Attributes
@@ -48,6 +47,8 @@ class OpenChain(Shown, Chain):
     numbers: Mapping[str, float]
     strains: np.ndarray
     first: np.ndarray
+
+    __repr__ = shown
 
     @property
     def segment(self) -> float:

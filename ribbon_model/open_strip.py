@@ -20,7 +20,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from contin import ContinError, Event, Point, ProblemError, VariationalProblem, solve
-from contin.lowlevel import Collocation, Continuation
+from contin.lowlevel import Collocation, Continuation, shown
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
@@ -29,7 +29,6 @@ from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.section import Section
 from ribbon_model.shape import Shape, shape_of
-from ribbon_model.shown import Shown
 
 #: Columns of the reactions.
 REACTIONS = tuple(
@@ -42,8 +41,8 @@ _ZERO = 1e-10
 _MOST_PHASES = 2
 
 
-@dataclass(repr=False)  # the directions are normalised when it is made, and then left as they are
-class OpenStrip(Shown):
+@dataclass  # the directions are normalised when it is made, and then left as they are
+class OpenStrip:
     """A strip between two ends.
 
     Attributes
@@ -90,6 +89,8 @@ class OpenStrip(Shown):
     stroke_direction: ends.Vector = DIRECTIONS["tangent"]
     phases: tuple[str, ...] = ()
     roller: Roller | None = None
+
+    __repr__ = shown
 
     def __post_init__(self) -> None:
         self.weight_direction = ends.unit("weight_direction", self.weight_direction)

@@ -24,13 +24,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, interpolation
+from contin.lowlevel import basis, interpolation, shown
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
 from ribbon_model.older import takes_parameters
 from ribbon_model.shape import frames
-from ribbon_model.shown import Shown
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 #: Degree on the mesh of a circle, and the phase in radians by which the highest wave of interest turns on an interval: there
@@ -71,8 +70,8 @@ class Symmetry:
         return self.mirror or self.axis
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Equilibrium(Shown):
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
     """A closed equilibrium, B = 1, L = 2 pi.
 
     Attributes
@@ -100,6 +99,8 @@ class Equilibrium(Shown):
     symmetry: Symmetry
     mesh: np.ndarray
     degree: int
+
+    __repr__ = shown
 
     def response(self, moment):
         """Return the strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""

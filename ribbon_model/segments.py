@@ -15,11 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
+from contin.lowlevel import shown
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
-from ribbon_model.shown import Shown
 
 _CLOSED = 1e-12  # tolerance of the conditions of closure
 
@@ -160,8 +160,8 @@ class Chain:
 # --- the discrete strip -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Strip(Shown, Chain):
+@dataclass(frozen=True, eq=False)
+class Strip(Chain):
     """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
 
     Attributes
@@ -178,6 +178,8 @@ class Strip(Shown, Chain):
     parameters: float | Mapping[str, float]
     kappa_n: float
     strains: np.ndarray
+
+    __repr__ = shown
 
     @property
     def first(self) -> np.ndarray:

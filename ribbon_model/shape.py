@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, interpolation
+from contin.lowlevel import basis, interpolation, shown
 from ribbon_model.equilibrium import directors
-from ribbon_model.shown import Shown
 
 
-@dataclass(frozen=True, repr=False)
-class Shape(Shown):
+@dataclass(frozen=True)
+class Shape:
     """A strip in space, or a part of it.
 
     Attributes
@@ -35,6 +34,8 @@ class Shape(Shown):
     eta: np.ndarray
     breadth: float | np.ndarray = 1.0
     depth: float | np.ndarray = 1.0
+
+    __repr__ = shown
 
     def closure(self) -> float:
         """Return the largest difference between the two ends, in position and directors."""

@@ -8,19 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin import Point
-from contin.lowlevel import Collocation
+from contin.lowlevel import Collocation, shown
 from ribbon_model import stability
 from ribbon_model.domains import CELL, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH, on_directors
 from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, from_solution
 from ribbon_model.shape import Shape, frames, interpolated, quadrature_centreline, quaternions
-from ribbon_model.shown import Shown
 from ribbon_model.stability import Stability
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Solution(Shown):
+@dataclass(frozen=True, eq=False)
+class Solution:
     """An equilibrium of a closed strip, on the domain that it was computed on; B = 1, L = 2 pi.
 
     Attributes
@@ -54,6 +53,8 @@ class Solution(Shown):
     states: np.ndarray
     degree: int
     parameters: Mapping[str, float]
+
+    __repr__ = shown
 
     @classmethod
     def of(cls, point: Point) -> Solution:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from contin.lowlevel import shown
+
 if TYPE_CHECKING:  # columns of a stored result need no engine
     from contin import Point
 
@@ -114,6 +116,8 @@ class Column:
     of_labelled: bool = False
     derived: Callable[[Any], np.ndarray] | None = None
 
+    __repr__ = shown
+
     def of(self, row: Row) -> Any:
         """Return its value at a point."""
         return row.values[self.name] if self.value is None else self.value(row)
@@ -174,6 +178,8 @@ class Columns:
 
     values: tuple[Column, ...]
     watched: bool
+
+    __repr__ = shown
 
     @functools.cached_property
     def all(self) -> dict[str, Column]:

@@ -17,6 +17,9 @@ from contin.lowlevel import Collocation, Continuation, State, Stop
 class Watch(ABC):
     """The index along a stage."""
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
     @abstractmethod
     def index(self, point: Point) -> int:
         """Return the index of a point, -1 where it is undecided."""
@@ -68,6 +71,9 @@ class Stage(ABC):
     has_barriers: bool = False
     title: str = ""
     head: str
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.number}: follows {self.follow})"
 
     # --- the run --------------------------------------------------------------------------------------------------------
 

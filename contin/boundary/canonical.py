@@ -29,6 +29,7 @@ from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import recorded_paths
 from contin.functions.tape import Number, Tape, Unrecordable
+from contin.shown import shown
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ class Variation:
     parameters: tuple[str, ...]
     starts: tuple[float, ...]
 
+    __repr__ = shown
+
 
 @dataclass(frozen=True)
 class Canonical:
@@ -67,6 +70,8 @@ class Canonical:
     legendre: RecordedFunction | None
     sigmas: int
     fixed: tuple[tuple[int, ...], tuple[int, ...]]
+
+    __repr__ = shown
 
 
 def canonical(variation: Variation) -> Canonical:

@@ -21,6 +21,7 @@ from contin.errors import ProblemError
 from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
 from contin.problems.statement import check_statement, portable
 from contin.problems.vector_field import of_parameters
+from contin.shown import shown
 
 #: A number, the name of a parameter, or a function of the parameters.
 Quantity = float | str | Function
@@ -58,6 +59,8 @@ class Segment:
     begin: Quantity | None = None
     functionals: Mapping[str, Function] = field(default_factory=dict)
 
+    __repr__ = shown
+
     def portable(self, names: tuple[str, ...], parameters: tuple[str, ...]) -> Segment:
         """Return the segment with recordings in the place of functions that no other process finds by name."""
         inside: Arguments = [None, names, parameters]
@@ -74,6 +77,9 @@ class Piece(NamedTuple):
     at: slice
     length: Function
     begin: Function
+
+    def __repr__(self) -> str:
+        return shown(self)
 
 
 class SegmentedProblem(BoundaryValueProblem):

@@ -10,6 +10,7 @@ from contin.linalg.elimination import Range
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.segments import Share
 from contin.linalg.vector import address, scale_into
+from contin.shown import shown
 
 
 @kernel
@@ -58,6 +59,9 @@ class Tables(NamedTuple):
     value: Matrix
     slope: Matrix
     weights: Vector
+
+    def __repr__(self) -> str:
+        return shown(self)
 
 
 @kernel(last=True)

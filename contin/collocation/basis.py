@@ -9,6 +9,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.shown import shown
 
 DEGREES = range(2, 9)
 
@@ -32,6 +33,8 @@ class Basis:
     highest: Array
     barycentric: Array
     constant: float
+
+    __repr__ = shown
 
     @functools.cached_property
     def runge_kutta(self) -> Array:

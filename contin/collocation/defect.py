@@ -37,6 +37,7 @@ from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.linalg.condensation import Factored
 from contin.linalg.substitution import solve
+from contin.shown import shown
 
 #: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of
 #: the domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
@@ -59,6 +60,9 @@ class Finer(NamedTuple):
     projection: Matrix
     slope: Matrix
     end_slopes: Matrix
+
+    def __repr__(self) -> str:
+        return shown(self)
 
 
 @functools.cache
@@ -110,6 +114,9 @@ class Defect:
     ----------
     system : Collocation
     """
+
+    def __repr__(self) -> str:
+        return f"Defect({self.system!r})"
 
     def __init__(self, system: Any) -> None:
         self.system, self.tables, self.h = system, finer(system.degree), np.diff(system.mesh)

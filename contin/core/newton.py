@@ -44,6 +44,7 @@ from contin.linalg.convergence import (
     wants_jacobian,
 )
 from contin.linalg.factors import Factors
+from contin.shown import shown
 
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.
@@ -99,6 +100,8 @@ class Corrected:
     iterations: int
     error: float
     tangent: Array | None = None
+
+    __repr__ = shown
 
 
 def correct(

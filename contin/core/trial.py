@@ -14,6 +14,7 @@ from contin import checks
 from contin.arrays import Array, Numbers
 from contin.core.protocol import Discretization, inner
 from contin.linalg.factors import Factors
+from contin.shown import shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,8 @@ class Linearization:
     tangent: Array
     sign: float
     factors: Factors | None = None
+
+    __repr__ = shown
 
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
@@ -84,6 +87,10 @@ class Trial:
         self._functionals: dict[str, float] | None = None
         self._discretization_error: float | None = None
         self._values: dict[Event, float] = {}
+
+    def __repr__(self) -> str:
+        values = [f"{name}={self[name]:.6g}" for name in self.system.free]
+        return f"Trial({', '.join([*values, f'of {self.system!r}'])})"
 
     @classmethod
     def without_tangent(cls, system: Discretization, x: Array) -> Trial:
@@ -224,6 +231,8 @@ class Event:
     value: float | None = None
     normal_form: Callable[..., Numbers] | None = None
     still: float = 0.0
+
+    __repr__ = shown
 
     def __post_init__(self) -> None:
         checks.fields(self)

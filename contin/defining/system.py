@@ -72,6 +72,9 @@ class Defining(Discretization):
     #: The column of extrema that the curve consists of.
     objective = ""
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self.free)}; along it {self.base!r})"
+
     @property
     def stationary(self) -> str:
         """The column that is stationary at the points of the curve, among all solutions beside them; "" where there is none."""

@@ -20,6 +20,7 @@ from contin.core.step import located
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
+from contin.shown import shown
 
 #: Part of a step, and part of the corrector's tolerance of it, to which a zero is located: round-off of the place and, of the
 #: function, what the corrector leaves.
@@ -73,6 +74,8 @@ class SpecialPoint:
     errors: Mapping[str, float] | None = None
     is_lost: bool = False
     is_located: bool = True
+
+    __repr__ = shown
 
     @property
     def full_name(self) -> str:

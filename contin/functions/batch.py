@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import ProblemError
 from contin.functions.interpreted import Interpreted
@@ -112,6 +113,10 @@ class Batch:
             self._own = Recorded(given, self.signature)
         except Unrecordable as reason:
             self._own = Interpreted(given, self.signature, str(reason))
+
+    def __repr__(self) -> str:
+        states, parameters = (checks.listed(names) or "none" for names in (self.signature.states, self.signature.parameters))
+        return f"Batch({self.count} value{'s' * (self.count != 1)}; states {states}; parameters {parameters})"
 
     @property
     def interpreted(self) -> Interpreted | None:

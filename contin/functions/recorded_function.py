@@ -45,6 +45,9 @@ class RecordedFunction:
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
         return inspect.Signature([inspect.Parameter(name, kind) for name in self._names])
 
+    def __repr__(self) -> str:
+        return f"RecordedFunction({self.__name__}({', '.join(self._names)}))"
+
     def __call__(self, *arguments: object) -> Any:
         """Return the value: recorded for recorded numbers, else computed in Python."""
         values = _flat(arguments)

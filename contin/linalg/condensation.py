@@ -65,6 +65,9 @@ class Factorization:
         If the matrix is not square.
     """
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(sign of the determinant {self.sign:g})"
+
     def __init__(self, layout: Layout, blocks: Blocks) -> None:
         self._take(layout, blocks)
         factors, corners, first, last, carried, _ = self.room

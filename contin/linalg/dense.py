@@ -71,6 +71,9 @@ class DenseFactors:
     ([3.0, 1.0], -1.0)
     """
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(sign of the determinant {self.sign:g})"
+
     def __init__(self, matrix: Array) -> None:
         if matrix.shape[0] != matrix.shape[1]:
             raise ValueError(f"a matrix of {matrix.shape[0]} rows and {matrix.shape[1]} columns is not square")

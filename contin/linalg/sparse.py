@@ -35,6 +35,9 @@ class SparseFactors:
     ([3.0, 1.0], -1.0)
     """
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(sign of the determinant {self.sign:g})"
+
     def __init__(self, matrix: Any, borders: int = 0) -> None:
         from scipy.sparse.linalg import splu  # type: ignore[import-untyped]  # .1 s; only large problems need it
 

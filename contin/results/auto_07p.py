@@ -78,7 +78,7 @@ class AutoBranch:
     --------
     >>> branch = AutoBranch({"PAR(1)": np.array([0.0, 1.0])}, ["EP", "EP"])
     >>> branch
-    AutoBranch(2 points: EP EP; PAR(1))
+    AutoBranch(2 points: EP, EP; PAR(1))
     """
 
     columns: dict[str, Array]
@@ -86,7 +86,8 @@ class AutoBranch:
     solutions: list[AutoSolution] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        return f"AutoBranch({len(self.labels)} points: {' '.join(filter(None, self.labels))}; {', '.join(self.columns)})"
+        labels = checks.listed(filter(None, self.labels))
+        return f"AutoBranch({len(self.labels)} points: {labels}; {checks.listed(self.columns)})"
 
     def __len__(self) -> int:
         return len(self.labels)

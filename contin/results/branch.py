@@ -174,9 +174,9 @@ class Branch:
         ----------
         x, y : str, optional
             A parameter, a functional, ``"arclength"`` or ``"norm"`` (root mean square of the states over the nodes). By default
-            the first free parameter, and the first functional (``"norm"`` where there is none). Of algebraic problems they
-            may be states. Of cycles ``y`` may be one: its largest and its smallest value are drawn; by default those of the
-            first state.
+            the first free parameter, and the first functional; where there is none, the first state of algebraic problems,
+            and ``"norm"`` of others. Of cycles ``y`` may be a state: its largest and its smallest value are drawn; by default
+            those of the first one.
         axes : matplotlib.axes.Axes, optional
             Where to draw; a figure of its own without.
         errors : bool

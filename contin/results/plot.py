@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -16,34 +16,9 @@ from contin.results.axes import Axes, new_axes
 from contin.results.colours import Colour
 from contin.results.cubic import PARTS
 from contin.results.curve import column, curve
+from contin.results.marks import heading, mark_of
 from contin.results.point import Point
 
-#: Labelled points: matplotlib's symbol, colour, and the words of the legend.
-_MARKS = {
-    "EP": (".", Colour.BLACK, "end"),
-    "LP": ("*", Colour.VERMILION, "fold"),
-    "BP": ("o", Colour.BLACK, "branch point"),
-    "HB": ("s", Colour.GREEN, "Hopf point"),
-    "UZ": ("D", Colour.PURPLE, "given value"),
-    "EX": ("s", Colour.VERMILION, "extremum"),
-    "PD": ("X", Colour.BLUE, "period doubling"),
-    "TR": ("h", Colour.SKY, "torus bifurcation"),
-    "MX": ("x", Colour.BLACK, "Newton's method failed"),
-    "CP": ("^", Colour.VERMILION, "cusp"),
-    "BT": ("v", Colour.BLACK, "Bogdanov-Takens point"),
-    "ZH": ("<", Colour.ORANGE, "zero-Hopf point"),
-    "HH": (">", Colour.SKY, "double Hopf point"),
-    "GH": ("P", Colour.GREEN, "generalized Hopf point"),
-    "GPD": ("P", Colour.BLUE, "generalized period doubling"),
-    "CH": ("P", Colour.SKY, "Chenciner point"),
-    "LPPD": ("d", Colour.VERMILION, "fold-flip point"),
-    "LPTR": ("d", Colour.SKY, "fold-torus point"),
-    "R1": ("p", Colour.ORANGE, "resonance 1:1"),
-    "R2": ("p", Colour.PURPLE, "resonance 1:2"),
-    "R3": ("p", Colour.BLUE, "resonance 1:3"),
-    "R4": ("p", Colour.GREEN, "resonance 1:4"),
-}
-_OTHER_MARK = (".", Colour.BLACK, "")
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
 _CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)
 #: Dashes and legend of pieces, by whether they are stable; None: not known, beside others of which it is known.
@@ -54,7 +29,7 @@ _LINES: dict[bool | None, tuple[Any, str]] = {
 }
 #: Words of axes for columns that every branch has.
 _WORDS = {
-    "norm": "norm (root mean square of the states)", "arclength": "arclength of the branch",
+    "norm": "norm (rms of the states)", "arclength": "arclength of the branch",
     "discretization_error": "discretization error, relative to 1 + size",
 }  # fmt: skip
 #: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.
@@ -107,7 +82,7 @@ def _draw(
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]
-        marker, colour, word = _MARKS.get(label, _OTHER_MARK)
+        marker, colour, word = mark_of(label)
         area = _AREA.get(marker, _AREA[""])
         word = f"{word} ({label})" if word else label
         axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=once(word), zorder=2)
@@ -160,8 +135,7 @@ def _tell(axes: Axes, dots: Any, points: Sequence[Point]) -> None:
 
 def said(point: Point, number: int) -> str:
     """Return the label and the columns of a point, with the errors that are known, a line each."""
-    word = _MARKS.get(point.label, _OTHER_MARK)[2]
-    head = " ".join(filter(None, (point.label, f"({word})" if word else "", point.name)))
+    head = heading(point)
     lines = [f"point {number}{': ' * bool(head)}{head}"]
     columns = {**point.parameters, **point.functionals}
     for name, value in list(columns.items())[:_MOST_COLUMNS]:
@@ -214,17 +188,19 @@ def _stable(a: Point, b: Point) -> bool | None:
     return found.pop() if len(found) == 1 else None
 
 
-def picture(points: Sequence[Point]) -> str:
-    """Return the plot as SVG, or nothing where matplotlib is not installed."""
+def picture(draw: Callable[[Axes], Any]) -> str:
+    """Return what a function draws into axes as SVG, or nothing where matplotlib is not installed."""
     try:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
     except ImportError:
         return ""
     text = io.StringIO()
-    with rc_context({"svg.hashsalt": "contin"}):  # the same branch gives the same file
+    with rc_context({"svg.hashsalt": "contin"}):  # the same picture gives the same file
         figure = Figure(figsize=(4.5, 2.8), layout="constrained")
-        plot(points, axes=figure.subplots())
+        axes = figure.subplots()
+        draw(axes)
+        axes.locator_params(axis="x", nbins=6)  # numbers of more ticks touch each other in so small a picture
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()[text.getvalue().index("<svg") :]
 
@@ -236,7 +212,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
     first = points[0]
     x = first.system.free[0] if x is None else x
     states = first.system.problem.states if first.system.is_cycle and first.system.intervals else ()
-    y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y
+    y = next(iter((*states, *first.functionals, *first.system.named_states, "norm"))) if y is None else y
     check_column(points, "x", x, states)
     if y in states:
         return x, [f"max_{y}", f"min_{y}"], f"{y}, largest and smallest"

@@ -20,7 +20,7 @@ from contin.errors import ProblemError
 from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
-from contin.results import portrait
+from contin.results import notebook, portrait
 from contin.results.axes import Axes
 from contin.results.profile import Profile
 from contin.results.record import Record
@@ -120,6 +120,9 @@ class Point(Record):
         values = ", ".join(f"{name}={value:.6g}" for name, value in list(columns.items())[:_SHOWN])
         more = ", ..." if len(columns) > _SHOWN else ""
         return f"Point({' '.join(filter(None, (self.label, self.name)))}{': ' * bool(self.label)}{values}{more})"
+
+    def _repr_html_(self) -> str:
+        return notebook.point_to_html(self)
 
     @property
     def normal_form(self) -> float | None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from contin.results.curve import column
-from contin.results.plot import picture
+from contin.results.notebook import html_table
+from contin.results.plot import picture, plot
 from contin.results.point import Point
-
-#: Labelled points that the table of a notebook lists: about a screen. The others are counted.
-_MOST_ROWS = 20
 
 
 def to_pandas(points: Sequence[Point]) -> Any:
@@ -48,21 +47,29 @@ def to_html(points: Sequence[Point], stop: object, notes: Sequence[str] = ()) ->
     count, ended = len(points), f"; {html.escape(str(stop))}" if stop else ""
     parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(points)}{ended}</p>"]
     if points:
-        parts += [picture(points), _table(points)]
+        parts += [picture(lambda axes: plot(points, axes=axes)), _of_labelled(points)]
     parts += [f"<p>{html.escape(note)}</p>" for note in notes]
     return f"<div>{''.join(parts)}</div>"
 
 
-def _table(points: Sequence[Point]) -> str:
+def diagram_to_html(branches: Sequence[tuple[Sequence[Point], object]], junctions: int, draw: Callable[[Any], Any]) -> str:
+    """Return a diagram for a notebook: a picture where it can be drawn, and its branches (points, why they end), a row each."""
+    count = len(branches)
+    head = f"<p><b>Diagram</b> of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}</p>"
+    rows = [(f"{i}", f"{len(points)}", _labels(points), str(stop or "not ended")) for i, (points, stop) in enumerate(branches)]
+    drawn = picture(draw) if any(points for points, _ in branches) else ""
+    return f"<div>{head}{drawn}{html_table(('branch', 'points', 'labels', 'end'), rows)}</div>"
+
+
+def _labels(points: Sequence[Point]) -> str:
+    """Return how many labelled points of each kind there are, as text."""
+    counts = Counter(point.label for point in points if point.label)
+    return ", ".join(f"{count} {label}" for label, count in counts.items())
+
+
+def _of_labelled(points: Sequence[Point]) -> str:
     first = points[0]
     columns = list(dict.fromkeys([*first.system.free, *first.functionals]))
     special = [(number, point) for number, point in enumerate(points) if point.label]
-    rows = "".join(
-        f"<tr><td>{number}</td><td>{html.escape(point.label)}</td><td>{html.escape(point.name)}</td>"
-        + "".join(f"<td>{point[name]:.8g}</td>" for name in columns)
-        + "</tr>"
-        for number, point in special[:_MOST_ROWS]
-    )
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in ("point", "label", "name", *columns))
-    more = f"<p>and {len(special) - _MOST_ROWS} more labelled points</p>" if len(special) > _MOST_ROWS else ""
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}"
+    rows = [(f"{i}", point.label, point.name, *(f"{point[name]:.8g}" for name in columns)) for i, point in special]
+    return html_table(("point", "label", "name", *columns), rows, "labelled points")

@@ -24,12 +24,13 @@ from contin.functions.signature import argument_count
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import declared
-from contin.results import plot
+from contin.results import plot, table
 from contin.results.axes import Axes
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.results.record import system_of
 from contin.search.cycle_starts import switched, switches
+from contin.shown import shown
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -48,6 +49,8 @@ class Junction:
     taken: list[dict[int, int]]
     failed: list[tuple[int, int, str]] = field(default_factory=list)
     also: list[Point] = field(default_factory=list)
+
+    __repr__ = shown
 
 
 #: Branches that the text of a diagram shows: it fits on a screen.
@@ -110,6 +113,10 @@ class Diagram:
         for points in drawn:
             axes = plot.plot(points, x, y, axes, errors)
         return axes
+
+    def _repr_html_(self) -> str:
+        branches = [(branch.points, branch.stop) for branch in self.branches]
+        return table.diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes))
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.

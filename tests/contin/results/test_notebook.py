@@ -66,7 +66,7 @@ def test_plot(branch):
     words = {text.get_text() for text in axes.get_legend().get_texts()}
     assert words == {"end (EP)", "given value (UZ)", "fold (LP)"}
     axes = branch.plot("arclength", "norm", axes=Figure().subplots())
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength of the branch", "norm (root mean square of the states)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength of the branch", "norm (rms of the states)")
 
 
 def test_curves_have_the_tangents_of_the_branch(branch):
@@ -158,9 +158,28 @@ def test_html_is_well_formed_and_lists_labelled_points(branch):
     assert contin.Branch()._repr_html_() == "<div><p><b>Branch</b> of 0 points</p></div>"
 
 
-def test_a_problem_without_functionals_is_drawn_against_its_norm():
-    axes = contin.trace(contin.solve(parabola(), [1.0]), free=["mu"], limits={"mu": (0.5, 2)}).plot()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", "norm (root mean square of the states)")
+def test_points_and_diagrams_have_tables_in_notebooks(branch):
+    fold = branch.labelled("LP")[0]
+    root = ElementTree.fromstring(fold._repr_html_())
+    assert "".join(root.find("p").itertext()) == "Point: LP (fold) lam"
+    rows = [[cell.text for cell in row] for row in root.iterfind("table/tbody/tr")]
+    assert [row[0] for row in rows] == ["lam", "mean"] and rows[0][1] == f"{fold['lam']:.10g}"
+    assert float(rows[0][2]) == pytest.approx(fold.errors["lam"], rel=0.5)
+    root = ElementTree.fromstring(contin.Diagram([branch] * 30)._repr_html_())
+    assert root.find("{http://www.w3.org/2000/svg}svg") is not None
+    rows = [[cell.text for cell in row] for row in root.iterfind("table/tbody/tr")]
+    assert len(rows) == 20 and rows[0] == ["0", str(len(branch)), "2 EP, 2 UZ, 1 LP", str(branch.stop)]
+    assert root.findall("p")[-1].text == "and 10 more rows"
+
+
+def test_a_problem_without_functionals_is_drawn_by_its_first_state_or_its_norm():
+    """The norm of an equilibrium would hide its sign, and with it one of the arms of a pitchfork."""
+    branch = contin.trace(contin.solve(parabola(), [1.0]), free=["mu"], limits={"mu": (0.5, 2)})
+    axes = branch.plot()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", branch[0].system.named_states[0])
+    plain = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
+    axes = contin.trace(contin.solve(plain, [0, 0]), free=["q"], limits={"q": (8, 9)}, progress=False).plot()
+    assert axes.get_ylabel() == "norm (rms of the states)"
 
 
 def test_contin_alone_imports_neither_library():
