@@ -9,10 +9,12 @@ import os
 import re
 import runpy
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 PROJECT = Path(__file__).resolve().parent.parent
@@ -89,3 +91,23 @@ def _main(program):
         return runpy.run_path(program[0])["main"]
     module = importlib.import_module(program[1])
     return importlib.import_module(f"{program[1]}.__main__").main if hasattr(module, "__path__") else module.main
+
+
+def test_the_python_of_the_readme_runs(capsys):
+    """Euler: the buckling loads of a hinged rod are n**2 pi**2."""
+    (block,) = re.findall(r"^```python\n(.*?)^```", (PROJECT / "README.md").read_text(encoding="utf-8"), re.M | re.S)
+    scope = {}
+    exec(compile(block, "README.md", "exec"), scope)
+    loads = [point["load"] / np.pi**2 for point in scope["straight"].labelled("BP")]
+    assert loads == pytest.approx([1, 4], rel=1e-12) and scope["bent"].stop.reason == "limit"
+    assert "EP" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not (PROJECT / ".git").exists() or shutil.which("git") is None, reason="not a working copy")
+def test_git_ignores_what_the_commands_of_the_pages_write():
+    texts = [page.read_text(encoding="utf-8") for page in (PROJECT / "README.md", *PAGES)]
+    names = {name for text in texts for name in re.findall(r"--(?:out|movie) ([\w./-]+)", text)} - {"DIR"}
+    folders = {f"{name}/" for name in names if "." not in name}
+    written = sorted(folders | {name for name in names if "." in name} | {"m1_n2.pdf", "site/"})
+    done = subprocess.run(["git", "check-ignore", *written], cwd=PROJECT, capture_output=True, text=True)
+    assert done.stdout.split() == written
