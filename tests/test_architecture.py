@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 import contin
+import ribbon_model
 
 PROJECT = Path(__file__).resolve().parent.parent
 DOCS, PACKAGE = PROJECT / "docs", PROJECT / "contin"
 PAGE = (DOCS / "architecture.md").read_text()
-NAMED = set(re.findall(r"[\w/]+\.pyi?\b", PAGE))
+NAMED = set(re.findall(r"(?:\.ci/)?[\w/]+\.pyi?\b", PAGE))
 #: Steps of the run: a file and what is defined in it.
 STEPS = re.findall(r" ([\w/]+\.py): ([\w.]+)$", PAGE, re.M)
 
@@ -66,3 +67,17 @@ def test_the_reference_lists_all_public_names():
     modules = [name for name in contin.__all__ if isinstance(getattr(contin, name), types.ModuleType)]
     inside = [f"{module}.{name}" for module in modules for name in getattr(contin, module).__all__]
     assert sorted(listed) == sorted([*(set(contin.__all__) - set(modules)), *inside])
+
+
+def test_the_reference_lists_all_names_of_the_mechanics():
+    """Modules, classes and functions by their page, or that of their module; constants, which have no docstring, in a table."""
+    text = (DOCS / "reference.md").read_text()
+    pages = set(re.findall(r"^::: (ribbon_model\.[\w.]+)$", text, re.M))
+    for name in ribbon_model.__all__:
+        found = getattr(ribbon_model, name)
+        if isinstance(found, types.ModuleType):
+            assert found.__name__ in pages, name
+        elif isinstance(found, type | types.FunctionType):
+            assert {found.__module__, f"{found.__module__}.{name}"} & pages, name
+        else:
+            assert f"| `{name}` | " in text, name
