@@ -107,6 +107,7 @@ class OpenStage(Stage):
         self.title = f"stage {number}: {self.follow}{f' in {unit}' if unit else ''}\n"
         self.head = f"{self.follow:>14s}     energy      F_tangent      index   N  it"
         self._largest = abs(self.stage.to)
+        self._missed: list[str] = []
 
     # --- the run --------------------------------------------------------------------------------------------------------
 
@@ -128,6 +129,7 @@ class OpenStage(Stage):
 
     def told(self, run: Continuation, last: Point) -> Stop:
         if run.stop.reason not in (Reason.NO_CONVERGENCE, Reason.EVENT):
+            self._missed = self._came_back(run, last)
             return reached(run.stop, last, run, self._shown)
         law = self.strip.explained(run)
         if law is not None:
@@ -142,7 +144,17 @@ class OpenStage(Stage):
 
     def notes(self, run: Continuation) -> list[str]:
         units = " (numbers in units of L and B)" if self.scene.dimensions is not None else ""
-        return [f"stage {self.number}: {note}{units}" for note in run.notes]
+        return [f"stage {self.number}: {note}{units}" for note in run.notes] + self._missed
+
+    def _came_back(self, run: Continuation, last: Point) -> list[str]:
+        """Return a note if the stage turned back at a fold, and ended on the other side of its start."""
+        ends = run.settings.limits[self.follow]
+        to = self.stage.to / self.scene.factor(self.follow)
+        other = max(ends, key=lambda end: abs(end - to))
+        if abs(last[self.follow] - other) > _SLACK * (ends[1] - ends[0]):
+            return []
+        there, here = (self._shown(self.follow, value) for value in (to, other))
+        return [f"stage {self.number}: {there} was not reached: the strip came back, to {here}"]
 
     def _shown(self, name: str, value: float) -> str:
         """Return a number as a scene states it, with its unit."""

@@ -123,3 +123,15 @@ def test_the_stop_and_the_names_of_points_are_in_the_scene_s_units(tmp_path):
     assert (outcome, branch.stop) == ("complete", "reached distance = 0.3 m")
     assert [event["name"] for event in branch.events] == [b"start", b"distance = 0.35 m", b"distance = 0.3 m"]
     assert branch.events["distance"].tolist() == pytest.approx([0.39 / 0.4, 0.35 / 0.4, 0.3 / 0.4])
+
+
+def test_a_stage_that_turns_back_says_that_it_did_not_arrive(tmp_path):
+    """A clamped strip of length 1 cannot be pulled to a distance of 1.1: the run goes through the straight state and back."""
+    stages = "stages: [{follow: distance, to: 1.1}]\n"
+    outcome, branch = followed(f"{ARCH}{stages}", tmp_path)
+    assert (
+        outcome == "complete"
+        and "stage 1: distance = 1.1 was not reached: the strip came back, to distance = 0.8" in branch.notes
+    )
+    outcome, branch = followed(f"{ARCH}{stages.replace('1.1', '0.9')}", tmp_path)
+    assert not [note for note in branch.notes if "was not reached" in note]
