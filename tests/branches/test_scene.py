@@ -130,7 +130,7 @@ def test_any_column_of_an_open_strip_against_any_other(tmp_path, root):
     run_scene(load(root / "configs" / "open_tip.yaml"), tmp_path / "x.h5", Display(silent=True))
     branch = read_branch(tmp_path / "x.h5")
     (axes,) = branch.plot(shapes=0, x="energy", y="M_normal").axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("energy", "moment about the normal")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("energy in B/L", "moment about the normal in B/L")
     with pytest.raises(Exception, match="there is no column 'M_up' of numbers"):
         branch.plot(shapes=0, y="M_up")
 
