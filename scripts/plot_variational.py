@@ -17,9 +17,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 import contin
+from contin.lowlevel import Colour
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "images" / "variational.png"
-COLOURS = {0: "#1f6fb4", 1: "#d9822b", 2: "#a33b6c", 3: "#5b5b5b"}
+COLOURS = {0: Colour.BLUE, 1: Colour.ORANGE, 2: Colour.PURPLE, 3: Colour.GREY}
 
 
 def draw(axes: Any, branch: contin.Branch, x: str, y: str, unit: float = 1.0) -> None:
@@ -30,8 +31,8 @@ def draw(axes: Any, branch: contin.Branch, x: str, y: str, unit: float = 1.0) ->
         piece = points[first : last + 1]
         index = min(piece[len(piece) // 2].index or 0, 3)
         style = "-" if index == 0 else (0, (3, 2))
-        heights = [point[y] / unit for point in piece]
-        axes.plot([point[x] for point in piece], heights, ls=style, color=COLOURS[index], lw=1.8)
+        across, up = contin.Branch(piece).curve(x, y)
+        axes.plot(across, up / unit, ls=style, color=COLOURS[index], lw=1.8)
     for point in points:
         if point.label in ("BP", "LP"):
             axes.plot(point[x], point[y] / unit, "o", ms=5, color="black", zorder=3)
@@ -47,7 +48,7 @@ def elastica(axes: Any) -> None:
         integrals={"offset": lambda t, x, w, p: math.sin(x.angle)},
         functionals={"chord": lambda t, x, w, p: math.cos(x.angle)},
     )
-    settings = contin.Settings(limits={"load": (20, 170), "chord": (0.0, 1.5)}, max_step=0.1, errors=False)
+    settings = contin.Settings(limits={"load": (20, 170), "chord": (0.0, 1.5)}, errors=False)
     straight = contin.trace(contin.solve(strip, [0.0], {"load": 20.0}), settings, free=["load"])
     draw(axes, straight, "chord", "load", math.pi**2)
     for point in straight.labelled("BP"):
@@ -63,7 +64,7 @@ def catenoid(axes: Any) -> None:
         parameters={"gap": 0.4},
         ends=lambda a, b, p: (a.r - 1, b.r - 1),
     )
-    settings = contin.Settings(limits={"gap": (0.4, 1.5)}, max_step=0.05, errors=False)
+    settings = contin.Settings(limits={"gap": (0.4, 1.5)}, errors=False)
     draw(axes, contin.trace(contin.solve(film, [1.0]), settings, free=["gap"]), "gap", "energy")
     axes.set(xlabel="gap of the rings / radius", ylabel="area / 2π", title="Soap film between two rings")
 

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from branches.draw.strip import View, draw_strip, reach_of
-from branches.draw.style import LINES, OTHER, UNKNOWN, in_words, smooth
+from branches.draw.style import LINES, OTHER, UNKNOWN, in_words
 from branches.scene.labels import END
 
 #: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
 _PANELS = 4
 #: Largest length of the scale bar, as a part of the picture.
 _BAR = 0.45
+#: Area of the dots at computed points; those of unstable pieces are open.
+_DOT = 8
 #: Half the width of a letter and half the height of a line, in points of a text of 11 points.
 _WIDE, _HIGH = 3.4, 6.0
 #: Distance of a text from its place in points, beside half its size; and ways in which it is looked for.
@@ -128,19 +130,16 @@ def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
     (across, *_), (up, *_) = axis = [branch.axis(column) for column in columns]
     stages = _stages(branch, columns[0])
     rows = np.flatnonzero(np.isin(branch.stage_of, stages))
-    curves, pieces = [], branch.pieces()
-    unknown = LINES[None][0] if all(piece.stable is None for piece in pieces) else UNKNOWN
-    for piece in pieces:
-        if piece.stage in stages:
-            dashes, words = LINES[piece.stable] if piece.stable is not None else (unknown, LINES[None][1])
-            own = np.flatnonzero(branch.stage_of == piece.stage)
-            s = branch.points["arclength"][own]
-            fine, x, y = smooth(s, s, across[own], up[own])
-            here = (fine >= s[piece.rows[0] - own[0]]) & (fine <= s[piece.rows[-1] - own[0]])
-            axes.plot(x[here], y[here], color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1)
-            curves.append(np.column_stack([x[here], y[here]]))
-            if words not in seen:
-                axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
+    drawn = [(piece, curve) for piece, curve in branch.curves(*columns) if piece.stage in stages]
+    unknown = LINES[None][0] if all(piece.stable is None for piece in branch.pieces()) else UNKNOWN
+    for piece, (x, y) in drawn:
+        dashes, words = LINES[piece.stable] if piece.stable is not None else (unknown, LINES[None][1])
+        axes.plot(x, y, color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1)
+        fill = "white" if piece.stable is False else branch.colour(piece.stage)
+        places = across[piece.rows], up[piece.rows]
+        axes.scatter(*places, s=_DOT, facecolors=fill, edgecolors=branch.colour(piece.stage), lw=0.8, zorder=1.5)
+        if words not in seen:
+            axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
     if len(branch.stages) > 1:
         for stage in stages:
             axes.plot([], [], color=branch.colour(stage), lw=1.8, label=f"stage {stage}")
@@ -164,7 +163,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
     axes.scatter(across[plain], up[plain], s=18, color="#000000", zorder=2)
     texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point))) for point in here]
     axes.autoscale_view()
-    put(axes, texts, np.concatenate([*curves, np.column_stack([across, up])[rows]]))
+    put(axes, texts, np.concatenate([*(curve.T for _, curve in drawn), np.column_stack([across, up])[rows]]))
     axes.legend(frameon=False, fontsize=11)
 
 
@@ -209,6 +208,7 @@ def put(axes, texts, curves: np.ndarray) -> None:
             middle = at + ahead * (_AWAY + np.abs(ahead) @ half)
             cost = np.count_nonzero((np.abs(hidden - middle) < half).all(axis=1))
             cost += 100 * sum((np.abs(other - middle) < half + 6).all() for other in marks)
+            cost += 200 * any(np.hypot(*(other - middle)) < np.hypot(*(at - middle)) - 1 for other in marks)
             cost += 1000 * sum((np.abs(box[0] - middle) < half + box[1]).all() for box in boxes)
             cost += 1000 * bool((middle - half < low).any() or (middle + half > high).any())
             if best is None or cost < best[0]:

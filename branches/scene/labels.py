@@ -11,7 +11,7 @@ from contin.lowlevel import Colour
 _NOTHING = 1e-12
 #: Colours of marks, all with black edges. Those of folds and bifurcations are of no wavenumber (`branches.draw.style`);
 #: yellow is Okabe & Ito's, too pale for lines.
-FOLD, END, USER, SECONDARY = "#F0E442", Colour.BLACK, Colour.GREEN, "#BBBBBB"
+FOLD, END, USER, SECONDARY = Colour.YELLOW, Colour.BLACK, Colour.GREEN, "#BBBBBB"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from branches.draw.strip import OBLIQUE, View
+from branches.draw.style import smooth
 from branches.scene.columns import Columns
 from branches.scene.fields import Scene
 from branches.scene.labels import SPECIAL, Label, label_of
@@ -169,6 +170,20 @@ class StoredBranch(ABC):
             for first, last in pairwise(sorted({rows[0], rows[-1], *(row for row in rows if row in special)})):
                 index = self.index_on(np.arange(first, last + 1))
                 found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
+        return found
+
+    def curves(self, *names: str) -> list[tuple[Piece, np.ndarray]]:
+        """Return all pieces with columns, in their units, on smooth curves through the points, shape (names, many).
+
+        See `branches.draw.style.smooth`. Raises StoreError for a column that there is not.
+        """
+        columns, found = [self.measured(name)[0] for name in names], []
+        for piece in self.pieces():
+            own = np.flatnonzero(self.stage_of == piece.stage)
+            s = self.points["arclength"][own]
+            fine, *curve = smooth(s, s, *(column[own] for column in columns))
+            first, last = s[piece.rows[[0, -1]] - own[0]]
+            found.append((piece, np.array(curve)[:, (fine >= first) & (fine <= last)]))
         return found
 
     def index_on(self, rows: np.ndarray) -> int:

@@ -20,11 +20,12 @@ class Colour(enum.StrEnum):
     PURPLE = "#CC79A7"
     ORANGE = "#E69F00"
     SKY = "#56B4E9"
+    YELLOW = "#F0E442"
     BLACK = "#000000"
     GREY = "#767676"
 
 
-#: Colours of lines, in the order in which pictures take them. Their yellow is left out: on white paper it is hard to see.
+#: Colours of lines, in the order in which pictures take them. A line of yellow is hard to see on white paper.
 PALETTE = (
     Colour.BLUE, Colour.VERMILION, Colour.GREEN, Colour.PURPLE, Colour.ORANGE, Colour.SKY, Colour.BLACK,
 )  # fmt: skip

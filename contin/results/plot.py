@@ -34,9 +34,10 @@ _WORDS = {
 }  # fmt: skip
 #: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.
 _VISIBLE = 1e-3
-#: Areas of the marks in points squared: a star needs a larger one to look as large. Points without a label are dots.
+#: Areas of the marks in points squared: a star needs a larger one to look as large.
 _AREA = {"*": 90, "": 30}
-_DOT = 5
+#: Area of the dots at all points; those of unstable parts are open, as many dots in a row hide the dashes.
+_DOT = 9
 #: A click within this distance of a point, in points of the screen, is on it: as near as a hand aims.
 _NEAR = 5
 #: Columns that a click shows at most: the box stays small.
@@ -74,11 +75,16 @@ def _draw(
         named.add(word)
         return label
 
+    filled = [True] * len(points)
     for stable, piece in pieces:
+        filled[piece] = [stable is not False] * len(points[piece])
         dashes, word = _LINES[stable] if len(pieces) > 1 or stable is not None else ("-", None)
         fine = slice(piece.start * PARTS, (piece.stop - 1) * PARTS + 1)
         axes.plot(x[fine], y[fine], lw=1.5, color=Colour.BLUE, ls=dashes, label=once(word), zorder=1)
-    _tell(axes, axes.scatter(across, up, s=_DOT, color=Colour.BLUE, picker=True, pickradius=_NEAR, zorder=1.5), points)
+    style: dict[str, Any] = {"s": _DOT, "edgecolors": Colour.BLUE, "linewidths": 0.8, "zorder": 1.5}
+    fill = [Colour.BLUE if full else "white" for full in filled]
+    dots = axes.scatter(across, up, c=fill, picker=True, pickradius=_NEAR, **style)
+    _tell(axes, dots, points)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]

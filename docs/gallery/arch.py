@@ -44,7 +44,7 @@ _, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 symmetric.plot("height", "q", axes=left)
 leaning.plot("height", "q", axes=left)
 left.set(xlabel="height of the middle", ylabel="load q", xlim=(3.6, -3.6))
-left.legend(loc="lower left")
+left.legend(loc="upper center", bbox_to_anchor=(0.66, 1.02))
 t = np.linspace(0, math.pi, 200)
 level = min(leaning, key=lambda point: abs(point["height"]))
 for point, style in ((at_rest, "-"), (leaning.points[0], "-"), (level, "--"), (symmetric.labelled("BP")[1], "-")):

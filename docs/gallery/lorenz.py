@@ -34,6 +34,7 @@ assert abs(longer["r"] - 13.926557) < 1e-6
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 found.plot("r", "x", axes=left)
+left.legend(loc="upper left", fontsize=9)
 left.set(xlabel="heating r", ylabel="x: rest, and extremes of cycles")
 for point in cycles.points[2:-1:3]:
     point.plot("portrait", states=["x", "z"], axes=right)

@@ -37,12 +37,13 @@ assert abs(buckling["turn"] - 2 * math.pi * math.sqrt(3) / 0.8) < 1e-8
 
 figure = plt.figure(figsize=(9, 4))
 left = figure.add_axes((0.09, 0.14, 0.44, 0.8))
-flat, bent = (branch.points[branch.points["stage"] == stage] for stage in (1, 2))
-for points, style, name in ((flat, "--", None), (flat[flat["index"] == 0], "-", "stable"), (bent, "--", "unstable")):
-    left.plot(points["turn"], points["energy"], style, color="C0", label=name)
+for piece, (turn, energy) in branch.curves("turn", "energy"):
+    label = {(1, True): "stable", (2, False): "unstable"}.get((piece.stage, piece.stable))
+    left.plot(turn, energy, "-" if piece.stable else "--", color="C0", label=label)
 left.plot(buckling["turn"], buckling["energy"], "ko", label="branch point")
 left.legend()
 left.set(xlabel="turn before closing / rad", ylabel="energy L/B")
+flat, bent = (branch.points[branch.points["stage"] == stage] for stage in (1, 2))
 for place, row in enumerate((flat[0], *bent[[len(bent) // 4, len(bent) // 2, -1]])):
     axes = figure.add_axes((0.56 + 0.22 * (place % 2), 0.47 - 0.47 * (place // 2), 0.21, 0.44), projection="3d")
     axes.plot(*branch.shape(int(row["point"])).centreline.T, color="C1" if row["index"] else "C0", lw=4)

@@ -34,14 +34,14 @@ assert abs(-buckling["force_width"] - 4.0125993 * math.sqrt(2 / 1.3)) < 1e-6
 
 figure = plt.figure(figsize=(9, 4))
 left, right = figure.add_axes((0.09, 0.14, 0.44, 0.8)), figure.add_axes((0.55, 0, 0.45, 1), projection="3d")
-flat, bent = (branch.points[branch.points["stage"] == stage] for stage in (1, 2))
-left.plot(-flat["force_width"], abs(flat["rise"]), "--", color="C0", label="unstable")
-for points in (flat[flat["index"] == 0], bent):
-    left.plot(-points["force_width"], abs(points["rise"]), color="C0", label="stable" if points is bent else None)
+for piece, (force, rise) in branch.curves("force_width", "rise"):
+    label = {(1, False): "unstable", (2, True): "stable"}.get((piece.stage, piece.stable))
+    left.plot(-force, abs(rise), "-" if piece.stable else "--", color="C0", label=label)
 left.plot(-buckling["force_width"], 0, "ko")
 left.annotate("branch point", (-buckling["force_width"], 0), xytext=(-10, 12), textcoords="offset points", ha="right")
 left.legend()
 left.set(xlabel="load P L²/B", ylabel="sideways displacement of the tip / L")
+bent = branch.points[branch.points["stage"] == 2]
 for number in (0, *bent["point"][[1, len(bent) // 2, -1]]):
     width, normal, along = branch.shape(int(number)).surface(0.1).T
     right.plot_surface(along, normal, width, color="C1", alpha=0.7, lw=0)

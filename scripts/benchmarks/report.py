@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
+from contin.lowlevel import PALETTE
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -78,11 +79,19 @@ def update(path: Path, results: dict) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+#: Symbols of tools: colours alone do not tell them apart on a grey printer.
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+#: The lightest shade of degrees, of viridis: lighter lines are hard to see on white paper.
+_LIGHTEST = 0.9
+
+
 def pictures(results: dict, folder: Path) -> list[Path]:
     """Draw the results; return the files."""
     import matplotlib
+    from cycler import cycler
 
     matplotlib.use("Agg")
+    matplotlib.rcParams["axes.prop_cycle"] = cycler(color=[*PALETTE])
     folder.mkdir(parents=True, exist_ok=True)
     drawers = {"fold": ("bench-fold.png", _fold), "cost": ("bench-cost.png", _cost)}
     paths = []
@@ -115,9 +124,10 @@ def _fold(results):
     ):
         for number, tool in enumerate(tools):
             places = sorted((row[key], max(row["error"], 1e-16)) for row in results["rows"] if row["tool"] == tool)
-            axes.loglog(*zip(*places), "o", color=f"C{number}", alpha=0.3, markersize=3)
+            colour, marker = PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
+            axes.loglog(*zip(*places), marker, color=colour, alpha=0.3, markersize=3)
             best = [place for at, place in enumerate(places) if place[1] < min((e for _, e in places[:at]), default=np.inf)]
-            axes.loglog(*zip(*best), "o-", color=f"C{number}", label=tool, markersize=4)
+            axes.loglog(*zip(*best), f"{marker}-", color=colour, label=tool, markersize=4)
         axes.set(xlabel=f"seconds, {title}", title=title)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("error of $\\kappa_n$ at the fold of (1, 2)")
@@ -163,11 +173,13 @@ def _cost(results):
 
 
 def _errors(cases):
+    from matplotlib import colormaps
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.8), layout="constrained")
+    shades = colormaps["viridis"](np.linspace(0, _LIGHTEST, 7))
     for axes, case in zip(figure.subplots(1, len(cases), sharey=True), cases):
-        for colour, degree in enumerate(range(2, 9)):
+        for shade, degree in zip(shades, range(2, 9)):
             for adapted, style in ((False, ":"), (True, "-")):
                 rows = [row for row in case["rows"] if row["degree"] == degree and row["adapted"] == adapted]
                 label = f"degree {degree}" if adapted else None
@@ -175,7 +187,7 @@ def _errors(cases):
                     [row["intervals"] for row in rows],
                     [max(row["error"], 1e-16) for row in rows],
                     style,
-                    color=f"C{colour}",
+                    color=shade,
                     label=label,
                 )
         axes.set(xlabel="intervals", title=case["name"])
