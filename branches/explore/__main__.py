@@ -33,7 +33,7 @@ def main(argv=None) -> int:
     survive_any_encoding()
     options = parser().parse_args(argv)
     from branches.explore.gather import gather, left_out
-    from branches.explore.page import MissingLibraryError, assemble
+    from branches.explore.page import assemble
     from branches.store.files import StoreError, write_bytes
     from contin import ContinError
 
@@ -44,7 +44,7 @@ def main(argv=None) -> int:
         with interrupt.held():
             write_bytes(path, page)
             interrupt.change("the page is complete")
-    except (StoreError, MissingLibraryError, ContinError) as error:
+    except (StoreError, ContinError) as error:
         complain(f"error: {error}")
         return EXIT_BAD_INPUT
     write_output(f"written to {path} ({len(page) / 1e6:.1f} MB); open it in a browser\n")

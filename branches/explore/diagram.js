@@ -1,6 +1,7 @@
 "use strict";
 // The map, one column of the branches against another, drawn by plotly; a marker above it says where we are.
 
+const NARROW = 500; // pixels of a map in which names are short
 const MARGIN = { l: 62, r: 12, t: 8, b: 54 };
 let range = { x: [0, 1], y: [0, 1] }; // of the axes when the page, or another material, was opened
 
@@ -35,7 +36,10 @@ function specialPoints() {
   const found = marks();
   return {
     type: "scatter",
-    mode: "markers",
+    mode: "markers+text",
+    text: found.map(({ name }) => name && `\u2002${name}\u2002`), // beside the marker of the present place, too
+    textposition: found.map(({ side }) => `middle ${side}`),
+    textfont: { size: 11.5, color: colour("ink") },
     x: found.map((mark) => mark.x),
     y: found.map((mark) => mark.y),
     hoverinfo: "skip",
@@ -98,7 +102,7 @@ function ringNames() {
       return {
         x,
         y: ring.value("kappa_star", s),
-        text: loopName(ring.m),
+        text: $("diagram").clientWidth < NARROW ? `${minus(String(ring.m))}-fold` : loopName(ring.m),
         showarrow: false,
         xanchor: "right",
         yanchor: "bottom",

@@ -52,12 +52,20 @@ function lines() {
 
 const strokeOf = ({ tint, kind }) => ({ color: tint, dash: STYLES[kind][0], width: STYLES[kind][1], simplify: false });
 
+/** The name beside a fold of a strip, on the side to which its branch does not go. */
+function nameAt(branch, { kind, point }) {
+  const x = branch.columns[now.x],
+    rises = x[point] > x[Math.max(point - 1, 0)],
+    room = (range.x[1] - x[point]) / (range.x[1] - range.x[0]) > 60 / $("diagram").clientWidth; // pixels of a name
+  return { name: STRIPS && kind === "fold" ? nameOf(branch) : "", side: rises && room ? "right" : "left" };
+}
+
 /** Labelled points of the family that have a symbol. */
 const marks = () =>
   now.family.branches.flatMap((branch) =>
     (branch.marks || [])
       .filter((mark) => mark.kind in SYMBOLS)
-      .map((mark) => ({ kind: mark.kind, x: branch.columns[now.x][mark.point], y: branch.columns[now.y][mark.point] })),
+      .map((mark) => ({ kind: mark.kind, x: branch.columns[now.x][mark.point], y: branch.columns[now.y][mark.point], ...nameAt(branch, mark) })),
   );
 
 /** Entries of the legend, of what is inside the axes: lines {text, tint, kind} and symbols {text, symbol}. */

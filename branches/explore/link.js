@@ -55,9 +55,12 @@ async function restore(text) {
   for (const id of CONTROLS) setControl($(id), words.get(id), FIRST_VALUES[id]);
   if (SHAPES) $("triads").checked = words.has("directors");
   await chooseFamily(FAMILIES[Number(words.get("material"))] ? Number(words.get("material")) : 0, words.get("compare"));
-  const branch = now.family.branches.find(({ id }) => id === words.get("branch")) || now.branch,
-    s = words.has("point") ? Number(words.get("point")) : NaN;
-  await go(branch, Number.isFinite(s) ? s : branch.fromWay(0.45));
+  const wanted = now.family.branches.find(({ id }) => id === words.get("branch")),
+    branch = wanted || now.branch,
+    absent = words.has("branch") && !wanted,
+    s = words.has("point") && !absent ? Number(words.get("point")) : NaN;
+  tell(absent ? `The link names the branch “${words.get("branch")}”, which is not on this page. Shown instead: ${nameOf(branch)}.` : "");
+  await go(branch, Number.isFinite(s) ? s : opening(branch));
   const part = numbers(words.get("map"), 4),
     eye = numbers(words.get("eye"), 3) || Object.values(EYE);
   if (part) await zoom({ x: part.slice(0, 2), y: part.slice(2) });

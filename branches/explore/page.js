@@ -79,6 +79,12 @@ function listBranches() {
   );
 }
 
+/** Say something above the map; nothing with an empty text. */
+function tell(text) {
+  $("told").textContent = text;
+  $("told").hidden = !text;
+}
+
 /** The place where a branch opens: a computed point about halfway. */
 const opening = (branch) => (branch.circle ? branch.fromWay(0.45) : Math.round(branch.fromWay(0.45)));
 
@@ -87,6 +93,7 @@ async function chooseFamily(i, compare) {
   $("family").value = String(i);
   now.branch = now.family.branches[0];
   now.s = opening(now.branch);
+  offerAxes();
   [now.x, now.y] = [$("x").value, $("y").value];
   range = extent(false);
   listBranches();
@@ -96,12 +103,19 @@ async function chooseFamily(i, compare) {
   await moveOverlay();
 }
 
-/** Draw the map against other columns. */
+/** Draw the map against other columns; a column is not offered against itself. */
 async function chooseAxes() {
+  offerAxes();
   [now.x, now.y] = [$("x").value, $("y").value];
   range = extent(false);
   await drawDiagram();
   await update();
+}
+
+function offerAxes() {
+  if ($("x").value === $("y").value) for (const id of ["x", "y"]) $(id).value = FIRST_VALUES[id];
+  for (const [id, other] of [["x", "y"], ["y", "x"]])
+    for (const option of $(id).options) option.disabled = option.hidden = option.value === $(other).value;
 }
 
 function listChoices() {
@@ -110,12 +124,13 @@ function listChoices() {
   for (const id of ["x", "y"]) {
     for (const [name, { brief }] of AXES) {
       const plain = Object.assign(document.createElement("span"), { innerHTML: brief }).textContent;
-      if (!STRIPS || id === "y" || name === "kappa_n") $(id).add(new Option(plain, name));
+      if (!STRIPS || (id === "x") === (name === "kappa_n")) $(id).add(new Option(plain, name));
     }
     $(id).value = now[id];
     FIRST_VALUES[id] = now[id];
   }
   $("x-label").hidden = STRIPS;
+  $("snap-bar").hidden = !FAMILIES.some(({ branches }) => branches.some(({ marks = [] }) => marks.some(({ way }) => way)));
   $("colour").parentElement.hidden = !FAMILIES.some(({ branches }) => branches.some((branch) => branch.hasIndex));
 }
 
@@ -197,7 +212,17 @@ function mapMoved() {
   remember();
 }
 
+/** Unpack the library that draws, and run it. */
+async function loadLibrary() {
+  const stream = new Blob([bytes($("library").textContent)]).stream().pipeThrough(new DecompressionStream("gzip")),
+    code = await new Response(stream).text();
+  document.head.append(Object.assign(document.createElement("script"), { textContent: code }));
+  $("library").remove();
+}
+
 async function start() {
+  if (!window.DecompressionStream) return tell("This page needs a browser of 2023 or later.");
+  await loadLibrary();
   connect();
   $("width-value").textContent = `${$("width").value} % of length`;
   await restore(location.hash);

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import json
-from importlib import metadata, resources
+from importlib import resources
+
+#: The library that draws: plotly.js 4.1.1, the part that its publisher builds for lines and for surfaces in space (from the npm
+#: package plotly.js-gl3d-dist-min, packed by ``gzip -9n``). All of plotly.js is three times as large.
+_LIBRARY = "plotly-gl3d.min.js.gz"
+#: Its licence, which goes with it.
+_LICENCE = "plotly-LICENSE.txt"
 
 #: The page's own programs, in the order in which they build on each other.
 SCRIPTS = (
@@ -24,25 +31,6 @@ WORDS["open"] = {"hue": "stage", "state": WORDS["strips"]["state"]}
 CLASSES = {"strips": "strips", "branches": "branches", "open": "branches of-open"}
 
 
-class MissingLibraryError(Exception):
-    """The library that draws is not installed; the message says what to install."""
-
-
-def library() -> tuple[str, str]:
-    """The code of plotly.js, from the package ``plotly``, and the text of its licence.
-
-    Raises
-    ------
-    MissingLibraryError
-    """
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise MissingLibraryError("the page is drawn by plotly, which is not installed; pip install plotly") from error
-    licences = [file for file in metadata.files("plotly") or () if file.name.startswith("LICENSE")]
-    return get_plotlyjs(), "\n".join(file.read_text(encoding="utf-8") for file in licences)
-
-
 def _title(data: dict) -> str:
     """The title of results without one: it names their laws."""
     return f"Equilibria of a closed strip: {', '.join(dict.fromkeys(family['law'] for family in data['families']))}"
@@ -52,9 +40,10 @@ def assemble(data: dict) -> str:
     """The page that shows ``data``, as of `gather.gather`."""
     folder = resources.files(__package__)
     template, style, *scripts = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", *SCRIPTS))
-    code, licence = library()
+    licence = (folder / _LICENCE).read_text(encoding="utf-8")
     parts = {
-        "title": html.escape(data["title"] or _title(data)), "style": style, "library": code,
+        "title": html.escape(data["title"] or _title(data)), "style": style,
+        "library": base64.b64encode((folder / _LIBRARY).read_bytes()).decode(),
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip

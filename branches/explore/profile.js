@@ -9,14 +9,15 @@ function profileTraces() {
     { channels, nodes, components } = branch;
   const column = (c) => Array.from({ length: nodes }, (_, k) => values[k * channels + c]);
   if (!byTime())
-    return [
-      {
-        type: "bar",
-        x: components.map(escaped),
-        y: components.map((_, i) => values[i + 1]),
-        marker: { color: colour("accent") },
-      },
-    ];
+    return components.map((name, i) => ({
+      type: "scatter",
+      mode: "lines",
+      name: escaped(name),
+      x: [escaped(name), escaped(name)],
+      y: [0, values[i + 1]],
+      line: { color: colour("accent"), width: 40, simplify: false },
+      hoverinfo: "name+y",
+    }));
   return components.map((name, i) => ({
     type: "scatter",
     mode: "lines",
@@ -40,7 +41,11 @@ function profileLayout() {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
-    xaxis: { ...axis, title: { text: byTime() ? "independent variable t" : "", standoff: 6 } },
+    xaxis: {
+      ...axis,
+      title: { text: byTime() ? "independent variable t" : "", standoff: 6 },
+      ...(byTime() ? {} : { range: [-0.5, now.branch.components.length - 0.5] }),
+    },
     yaxis: { ...axis, title: { text: byTime() ? "states" : "state", standoff: 6 } },
     showlegend: byTime(),
     legend: { orientation: "h", x: 0, y: 1.12, font: { color: colour("ink") } },
