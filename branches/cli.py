@@ -35,6 +35,8 @@ def help_text() -> str:
 def main(argv=None) -> int:
     """Start a command with its arguments; return the exit code, unless the command ends the process itself."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if words[:1] == ["help"] and words[1:2]:
+        words = [words[1], "--help"]
     if words[:1] in (["--help"], ["-h"], ["help"]):
         sys.stdout.write(help_text())
         return 0

@@ -23,7 +23,7 @@ def parser() -> Parser:
         help="a branch file; the folder of a diagram; or a scene (.yaml) of closed strips, for an instant preview from the "
         "exact quadrature, with nothing computed by continuation",
     )  # fmt: skip
-    parser.add_argument("--out", help="picture to write, .pdf, .svg or .png (default: beside the result, .pdf)")
+    parser.add_argument("-o", "--out", help="picture to write, .pdf, .svg or .png (default: beside the result, .pdf)")
     of_branch = parser.add_argument_group("a branch")
     of_branch.add_argument("--x", metavar="COLUMN", help="column across (default: the number that is followed)")
     of_branch.add_argument("--y", metavar="COLUMN", help="column upwards (default: what is conjugate to it)")
@@ -107,7 +107,8 @@ def choose(graph, law, nu):
     found = [pair for pair in have if law in (None, pair[0]) and nu in (None, pair[1])]
     if not found:
         known = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in have)
-        raise StoreError(f"--law {law} --nu {nu}: the diagram has {known}")
+        asked = [f"--{name} {value}" for name, value in (("law", law), ("nu", nu)) if value is not None]
+        raise StoreError(f"{' '.join(asked)}: the diagram has {known}")
     law, nu = found[0]
     others = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in found[1:])
     more = f"drawn: {law}, nu = {exact_text(nu)}; the diagram also has {others} (--law, --nu)\n" if others else ""

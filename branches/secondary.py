@@ -234,8 +234,9 @@ def parser() -> Parser:
     )
     parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
     parser.add_argument(
-        "--out", metavar="DIR", help="folder for the results (default: the folder of the diagram; for a file NAME_secondary)"
-    )
+        "-o", "--out", metavar="DIR",
+        help="folder for the results (default: the folder of the diagram; for a file NAME_secondary)",
+    )  # fmt: skip
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field of the scenes of secondary branches"
     )

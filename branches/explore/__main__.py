@@ -21,7 +21,7 @@ def parser():
         "results", metavar="RESULT", nargs="+",
         help="a branch file (.h5), the folder of a diagram, a file of contin.save (.npz), or a folder of those",
     )  # fmt: skip
-    parser.add_argument("--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
+    parser.add_argument("-o", "--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
     parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     return parser
 

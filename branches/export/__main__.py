@@ -42,7 +42,7 @@ def parser() -> Parser:
     parser.add_argument("result", metavar="FILE", help="file of a branch, such as m1_n2.h5")
     parser.add_argument("--point", metavar="LABEL", help="number of a labelled point (its LAB), or its label, such as LP")
     parser.add_argument(
-        "--out", metavar="NAME", action="append", default=[],
+        "-o", "--out", metavar="NAME", action="append", default=[],
         help=f"file to write; may be repeated; the ending chooses the format: {', '.join((*SURFACES, '.csv'))}",
     )  # fmt: skip
     parser.add_argument(

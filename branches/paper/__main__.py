@@ -55,7 +55,7 @@ def parser() -> Parser:
         "The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
         "published number stands beside ours. Items that earlier calls put on the page stay there.",
     )
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
+    parser.add_argument("-o", "--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
     parser.add_argument("items", nargs="*", metavar="ITEM", help=f"any of {', '.join(ITEMS)} (default: all)")
     parser.add_argument("--quiet", action="store_true", help="print only the last line")
     return parser

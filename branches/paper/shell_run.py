@@ -407,7 +407,7 @@ def parser() -> Parser:
         "The unfolding semicircle by finite elements (CalculiX), for fig7 of branches.paper. What the file holds already is "
         "not computed again.",
     )
-    parser.add_argument("--out", required=True, metavar="FILE", type=Path, help="HDF5 file; fig7 looks for DIR/shell.h5")
+    parser.add_argument("-o", "--out", required=True, metavar="FILE", type=Path, help="HDF5 file; fig7 looks for DIR/shell.h5")
     parser.add_argument("--full", action="store_true", help="compute further cases: finer meshes, other strips")
     parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     return parser

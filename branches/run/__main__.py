@@ -24,7 +24,7 @@ def parser():
     )
     parser.add_argument("config", metavar="CONFIG", help="the scene: a YAML file, or a name that `ribbon scenes` lists")
     parser.add_argument(
-        "--out", metavar="PATH", help="result file or folder (default: the name of the config with .h5, in this folder)"
+        "-o", "--out", metavar="PATH", help="result file or folder (default: the name of the config with .h5, in this folder)"
     )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field, as in --set nu=0.2 --set mesh.degree=5"
@@ -66,6 +66,10 @@ def _run(options) -> int:
 
     options.config = found(options.config)
     try:
+        if options.workers is not None and options.workers < 1:
+            raise ConfigError(f"--workers {options.workers}: must be at least 1")
+        if not options.time_limit > 0:
+            raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
         scene = load(options.config, options.set)
         for caution in next(iter(scene.scenes.values())).cautions:
             complain(f"caution: {caution}")
@@ -117,10 +121,6 @@ def _run_many(sweep, options) -> int:
         raise ConfigError(
             "--resume: is not for scenes of many branches; run the scene again, it computes the branches that are missing"
         )
-    if options.workers is not None and options.workers < 1:
-        raise ConfigError(f"--workers {options.workers}: must be at least 1")
-    if not options.time_limit > 0:
-        raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
     folder = Path(options.out or Path(options.config).stem)
     check_folder_name(folder)
     from branches.run.progress import StartingDisplay

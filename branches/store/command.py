@@ -37,7 +37,11 @@ class Parser(argparse.ArgumentParser):
                 from branches.scene.meant import meant
 
                 self.error(f"there is no option {name}{meant(name, self._option_string_actions)}")
-        return super().parse_args(args, namespace)
+        options, rest = self.parse_known_args(args, namespace)
+        if rest:
+            field = "; a field of a scene is changed by --set KEY=VALUE" if "--set" in self._option_string_actions else ""
+            self.error(f"unrecognized arguments: {' '.join(rest)}{field}")
+        return options
 
     def error(self, message):
         complain(f"error: {message} (--help shows what there is)")

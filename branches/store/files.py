@@ -75,8 +75,13 @@ def check_folder_name(path: Path) -> None:
 
 def absent(path: Path) -> str:
     """Return that there is no such file, and the one beside it that was probably meant."""
+    from branches.scene.parse import scenes
+
     beside = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
-    return f"there is no such file{meant(path.name, beside)}"
+    near = meant(path.name, beside)
+    if not near and str(path) in {scene.stem for scene in scenes()}:
+        near = f"; it is the name of a scene: {typed('run')} {path}"
+    return f"there is no such file{near}"
 
 
 def no_branch(path: Path) -> str:

@@ -54,6 +54,16 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
+def test_a_mistake_is_answered_with_what_to_type(command):
+    said = command("run", "m1_n2", "nu=0.2", program=PROGRAM).err
+    assert said.startswith("error: unrecognized arguments: nu=0.2; a field of a scene is changed by --set KEY=VALUE")
+    said = command("run", "m1_n2", "--outt", "x", program=PROGRAM).err
+    assert said.startswith("error: there is no option --outt (did you mean '--out'?)")
+    said = command("plot", "fig12", program=PROGRAM).err
+    assert said == "error: cannot read 'fig12': there is no such file; it is the name of a scene: ribbon run fig12\n"
+    assert command("help", "scenes", program=PROGRAM).out == command("scenes", "--help", program=PROGRAM).out != ""
+
+
 @pytest.mark.posix("on Windows, bash may be that of another system")
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
 @pytest.mark.parametrize(
