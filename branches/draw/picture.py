@@ -175,10 +175,10 @@ def _mark(axes, mark, place, seen: set) -> None:
 
 
 def _arrow(axes, place, target: float, released: str) -> None:
-    """Draw where a fold snaps to, with the energy that it releases."""
+    """Draw an arrow from a fold that snaps to the stable state of least energy, and say how much lower that is."""
     style = {"arrowstyle": "->", "color": "#000000", "lw": 1.2}
     axes.annotate("", (place[0], target), place, arrowprops=style, zorder=2)
-    words = f"snap, releases {in_words(released)}"
+    words = f"snap: a stable state lies {in_words(released)} lower"
     axes.plot([], [], color="#000000", ls="", marker=r"$\downarrow$", ms=12, label=words)  # in the legend: no curve is hidden
 
 

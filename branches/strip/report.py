@@ -133,17 +133,15 @@ def lost_lines(modes: list[tuple[int, int]]) -> Iterator[str]:
 
 
 def _fate(rings: list[State], stable_others: list[State]) -> Iterator[str]:
-    """Yield the states into which the single loop can fold: stable states of less energy."""
+    """Yield whether the single loop is stable, and the stable states of less energy; the ways there are not computed."""
     single = rings[0]
     below = sorted(
         (state for state in (*rings[1:], *stable_others) if state.stable and state.energy < single.energy),
         key=lambda state: state.energy,
     )
     ends = ", ".join(f"{state.name} ({single.energy - state.energy:.3g} J less)" for state in below) or "nothing found here"
-    if not single.stable:
-        yield f"the single loop is unstable and folds into {'one of: ' if len(below) > 1 else ''}{ends}"
-    elif below:
-        yield f"the single loop is stable; pushed far enough it can fold into: {ends}"
+    if below or not single.stable:
+        yield f"the single loop is {'stable' if single.stable else 'unstable'}; stable states of less energy: {ends}"
     else:
         yield "the single loop is stable, and nothing stable has less energy"
 

@@ -1,6 +1,6 @@
 r"""# A closed ribbon: from one loop to three
 
-A strip of paper or steel with the natural curvature $\kappa_n$ is closed to a ring. It has a fold where it snaps, and ends
+A strip of paper or steel with the natural curvature $\kappa_n$ is closed to a ring. Its branch has a fold, and ends
 on the circle of three turns: this is the frame of a car's sunshade as it folds. The ribbon of Audoly & Seffen (2015) has
 the energy
 
