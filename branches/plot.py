@@ -10,7 +10,7 @@ if __name__ == "__main__":  # before the imports below, which take a second
 import sys
 from pathlib import Path
 
-from branches.store.command import Parser, complain, write_output
+from branches.store.command import Parser, complain, view_fault, write_output
 from branches.store.files import StoreError, check_picture, write_picture
 from contin.lowlevel import exact_text
 
@@ -67,6 +67,8 @@ def main(argv=None) -> int:
 
 def _check(options) -> None:
     """Raise ValueError on an option that makes no picture."""
+    if fault := view_fault(options.view):
+        raise ValueError(fault)
     if not 0 <= options.shapes <= 12:
         raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
     if options.width is not None and not 0 < options.width <= 2:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import html
 import io
 
+#: Labelled points that the table lists: about a screen. The others are counted.
+_MOST_ROWS = 20
+
 
 def to_html(branch) -> str:
     """Return a `branches.read.StoredBranch` as HTML: name, reason of its end, picture, labelled points."""
@@ -12,15 +15,21 @@ def to_html(branch) -> str:
     branch.plot(shapes=0).savefig(picture, format="svg")
     svg = picture.getvalue()[picture.getvalue().index("<svg") :]
     stop = html.escape(branch.stop or branch.status)
-    head = "".join(f"<th>{name}</th>" for name in branch.shown)
-    rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in branch.events[list(branch.shown)].tolist())
+    table = {key: values[branch.events["point"]].tolist() for key, values in branch.in_units().items()}
+    titles = {key.partition(" [")[0]: key for key in table}  # with units
+    columns = {}
+    for name in branch.shown:
+        columns[titles.get(name, name)] = table[titles[name]] if name in titles else branch.events[name].tolist()
+    head = "".join(f"<th>{html.escape(title)}</th>" for title in columns)
+    events = [*zip(*columns.values())]
+    rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in events[:_MOST_ROWS])
+    more = f"<p>and {len(events) - _MOST_ROWS} more labelled points</p>" if len(events) > _MOST_ROWS else ""
     return (
         f"<div><p><b>{html.escape(branch.about)}</b>: {len(branch.points)} points; {stop}</p>{svg}"
-        f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}</div>"
     )
 
 
 def _cell(value) -> str:
-    if isinstance(value, bytes):
-        return f"<td>{html.escape(value.decode())}</td>"
-    return f"<td>{value:.10f}</td>" if isinstance(value, float) else f"<td>{value}</td>"
+    text = value.decode() if isinstance(value, bytes) else str(value)
+    return f"<td>{value:.10g}</td>" if isinstance(value, float) else f"<td>{html.escape(text)}</td>"

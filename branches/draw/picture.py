@@ -121,8 +121,10 @@ def choose(branch, count: int, stages: set[int]) -> list[int]:
     return sorted(set(chosen) - again)
 
 
-def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
+def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> None:
     """Draw a column against another: solid where stable, with marks at labelled points and letters at the strips drawn.
+
+    ``dots`` are drawn at all computed points.
 
     Of several stages, those that follow the column across are drawn, or all if none does; each has its colour.
     """
@@ -137,7 +139,8 @@ def panel(axes, branch, columns: tuple[str, str], chosen) -> None:
         axes.plot(x, y, color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1)
         fill = "white" if piece.stable is False else branch.colour(piece.stage)
         places = across[piece.rows], up[piece.rows]
-        axes.scatter(*places, s=_DOT, facecolors=fill, edgecolors=branch.colour(piece.stage), lw=0.8, zorder=1.5)
+        if dots:
+            axes.scatter(*places, s=_DOT, facecolors=fill, edgecolors=branch.colour(piece.stage), lw=0.8, zorder=1.5)
         if words not in seen:
             axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
     if len(branch.stages) > 1:

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from branches.store.command import Parser, Quantity, complain, survive_any_encoding, write_output
+from branches.store.command import Parser, Quantity, complain, survive_any_encoding, view_fault, write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid command lines are answered at once
     from numpy import ndarray
@@ -51,6 +51,10 @@ def parser() -> Parser:
         help="table of all points of the branch in its units (SI where the scene has dimensions), .csv",
     )
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
+    parser.add_argument(
+        "--view", nargs=2, type=float, metavar=("AZIMUTH", "ELEVATION"),
+        help="the side from which the film shows the strip, in degrees (default: as 'ribbon plot')",
+    )  # fmt: skip
     parser.add_argument(
         "--length", type=Quantity("m"), metavar="X",
         help="length of the strip in the files, a number, or one with a unit as in 20cm, which becomes 0.2 (default: that of "
@@ -94,7 +98,7 @@ def _export(options) -> int:
             from branches.export.film import film
 
             width = options.width / (options.length or branch.length) * branch.shape_length if options.width else None
-            files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width)
+            files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width, options.view)
         for path, data in files.items():
             write_bytes(path, data)
     except (ConfigError, StoreError) as error:
@@ -115,6 +119,8 @@ def check(options) -> None:
     """
     from branches.scene.fields import ConfigError
 
+    if fault := view_fault(options.view):
+        raise ConfigError(fault)
     if not (options.out or options.movie or options.table):
         raise ConfigError(
             "--out: is needed, as in --point LP --out strip.stl; or --movie, as in --movie fold.gif; or --table, as in "

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from branches.draw.picture import panel, scale_bar, weight_arrow
-from branches.draw.strip import draw_strip, places, reach_of
+from branches.draw.strip import View, draw_strip, places, reach_of
 from branches.store.files import StoreError
+from contin.lowlevel import Colour
 
 #: Frames a second. Ten times more is faster than a person sees, and GIF has no more than 50.
 RATE = 16
@@ -28,7 +29,9 @@ _COLOURS = 256
 _REST = 6
 
 
-def film(branch, ending: str, frames: int, width: float | None = None) -> bytes:
+def film(
+    branch, ending: str, frames: int, width: float | None = None, view: tuple[float, float] | None = None
+) -> bytes:  # fmt: skip
     """The film of a branch, as the content of a file; a GIF goes back the way it came and begins again.
 
     Parameters
@@ -41,6 +44,8 @@ def film(branch, ending: str, frames: int, width: float | None = None) -> bytes:
         point whose solution is kept.
     width : float, optional
         Width of the drawn strip, in units of L/2 pi; see `branches.store.branch.StoredBranch.drawn_width`.
+    view : (float, float), optional
+        The side from which the strip is seen, as of `branches.draw.picture.figure`.
 
     Raises
     ------
@@ -53,7 +58,8 @@ def film(branch, ending: str, frames: int, width: float | None = None) -> bytes:
     strips = branch.posed(kept)
     chosen = {point: strips[point] for point in evenly(strips, frames)}
     write = {".gif": _gif, ".mp4": _mp4}[ending]
-    return write(drawn(branch, chosen, branch.drawn_width([*chosen.values()], width), _DPI[ending]))
+    seen = branch.view if view is None else View(*view)
+    return write(drawn(branch, chosen, branch.drawn_width([*chosen.values()], width), _DPI[ending], seen))
 
 
 def evenly(strips: dict, count: int) -> list[int]:
@@ -65,12 +71,12 @@ def evenly(strips: dict, count: int) -> list[int]:
     return [list(strips)[number] for number in dict.fromkeys(nearest)]
 
 
-def drawn(branch, strips: dict, width: float, dpi: int) -> Iterator[np.ndarray]:
+def drawn(branch, strips: dict, width: float, dpi: int, view: View) -> Iterator[np.ndarray]:
     """Pictures of the strips at points of a branch, one after the other, shape (height, width, 3) in bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure, reach = Figure(figsize=(_SIZE, _SIZE), dpi=dpi), reach_of(strips.values(), width, branch.view)
+    figure, reach = Figure(figsize=(_SIZE, _SIZE), dpi=dpi), reach_of(strips.values(), width, view)
     canvas = FigureCanvasAgg(figure)
     above = figure.add_axes((0.22, 0.41, 0.57, 0.57))
     words: dict[str, Any] = {}
@@ -78,10 +84,10 @@ def drawn(branch, strips: dict, width: float, dpi: int) -> Iterator[np.ndarray]:
     figure.legend(words.values(), words.keys(), loc="upper left", frameon=False, fontsize=9)  # beside the strip
     for point, strip in strips.items():
         above.clear()
-        draw_strip(above, strip, width, reach, branch.view, round(0.57 * _SIZE * dpi))
+        draw_strip(above, strip, width, reach, view, round(0.57 * _SIZE * dpi))
         scale_bar(above, branch, reach)
         if branch.is_heavy:
-            weight_arrow(above, reach, branch.view)
+            weight_arrow(above, reach, view)
         here = branch.followed(int(branch.stage_of[point]))
         for name, (below, dot, across, up) in graphs.items():
             below.set_visible(name == here)
@@ -93,7 +99,7 @@ def drawn(branch, strips: dict, width: float, dpi: int) -> Iterator[np.ndarray]:
 def _graph(figure, branch, columns: tuple[str, str], words: dict[str, Any]) -> tuple[Any, Any, np.ndarray, np.ndarray]:
     """Draw the curve of a number that is followed; return its axes, the dot, and both columns. ``words`` are of the legend."""
     below = figure.add_axes((0.12, 0.09, 0.84, 0.26))
-    panel(below, branch, columns, [])
+    panel(below, branch, columns, [], dots=False)  # a film is made of many points: their dots would hide the line
     for handle, word in zip(*below.get_legend_handles_labels()):
         words.setdefault(word, handle)
     below.get_legend().remove()
@@ -105,6 +111,7 @@ def _graph(figure, branch, columns: tuple[str, str], words: dict[str, Any]) -> t
 
 def _gif(frames: Iterable[np.ndarray]) -> bytes:
     """All frames and back, with one palette for all: a colour that does not change is not stored again."""
+    from matplotlib.colors import to_rgb
     from PIL import Image
 
     pictures = [Image.fromarray(frame) for frame in frames]
@@ -112,8 +119,9 @@ def _gif(frames: Iterable[np.ndarray]) -> bytes:
     sample = Image.new("RGB", (side, 3 * side))
     for number in range(3):
         sample.paste(pictures[number * (len(pictures) - 1) // 2], (0, number * side))
-    palette = sample.quantize(_COLOURS)
-    white, colours = palette.getpixel((0, 0)), palette.getpalette()
+    marks = [round(255 * part) for colour in Colour for part in to_rgb(colour)]  # of few pixels: counted out, they would change
+    palette = sample.quantize(_COLOURS - len(Colour))
+    white, colours = palette.getpixel((0, 0)), [*palette.getpalette()[: 3 * (_COLOURS - len(Colour))], *marks]
     palette.putpalette([255 if i // 3 == white else value for i, value in enumerate(colours)])  # not the mean of near whites
     first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     others += others[-2::-1]

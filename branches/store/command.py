@@ -78,6 +78,14 @@ def survive_any_encoding() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
+def view_fault(view: list[float] | None) -> str | None:
+    """Return what is wrong with the option --view, in a sentence; None where nothing is."""
+    if view is None or (abs(view[0]) <= 360 and abs(view[1]) <= 90):
+        return None
+    asked = f"--view {view[0]:g} {view[1]:g}"
+    return f"{asked}: the azimuth must lie between -360 and 360, the elevation between -90 and 90 (degrees)"
+
+
 def complain(text: str) -> None:
     """One line to standard error; where that fails too (a closed terminal), the exit code is all that is left to say it."""
     with contextlib.suppress(OSError):

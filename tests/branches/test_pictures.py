@@ -2,6 +2,8 @@
 
 import itertools
 import math
+import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from branches.draw import strip as draw_strip
 from branches.draw.picture import figure, panel
 from branches.draw.solid import widest
 from branches.draw.style import colour_of
+from branches.export import __main__ as export
 from branches.export.film import drawn as frames
 from branches.export.film import evenly
 from branches.graph.disentangle import crossings
@@ -28,6 +31,7 @@ from branches.run.many import run_many
 from branches.run.runner import run_scene
 from branches.scene.parse import load, parse
 from branches.store.files import write_picture
+from contin.lowlevel import Colour
 from ribbon_model import exact
 
 
@@ -71,6 +75,16 @@ def test_the_script_says_which_family_it_draws(tmp_path, call):
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
     assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
     assert call(main, tmp_path / "two", "--out", "x.png", "--plain", "--nu", "0.31").out == "written to x.png\n"
+
+
+def test_colours_of_the_palette_are_in_one_place(root):
+    """And no picture takes matplotlib's own, among which red and green lines look alike to many."""
+    files = [path for folder in ("contin", "ribbon_model", "branches", "scripts") for path in (root / folder).rglob("*.py")]
+    texts = {path.relative_to(root).as_posix(): path.read_text(encoding="utf-8") for path in files}
+    where = {name for name, text in texts.items() if any(f'"{colour}"' in text for colour in Colour if colour != "#000000")}
+    assert where == {"contin/results/colours.py"}
+    own = re.compile(r"""["'](tab:\w+|red|green|C\d|r|g)["']""")
+    assert not [name for name, text in texts.items() if re.search(r"color=" + own.pattern, text)]
 
 
 # --- open strips ------------------------------------------------------------------------------------------------------
@@ -131,11 +145,27 @@ def test_the_force_of_a_stroke_is_the_rate_of_the_energy(stroke):
     assert stroke.axis("F_stroke")[1] == "force along the stroke in N"
 
 
+def test_a_notebook_has_the_units_of_the_scene(stroke):
+    root = ElementTree.fromstring(stroke._repr_html_())
+    head = [cell.text for cell in root.iterfind("table/thead/tr/th")]
+    assert head == ["point", "label", "name", "stage", "distance [m]", "stroke [m]", "energy [J]", "index"]
+    last = [cell.text for cell in root.findall("table/tbody/tr")[-1]]
+    assert last[1] == "EP" and float(last[5]) == pytest.approx(0.1) and float(last[6]) == pytest.approx(0.0230552, rel=1e-5)
+
+
+@pytest.mark.parametrize("angles", [(0, 91), (361, 0), (math.nan, 0)])
+def test_views_that_there_are_not(call, stroke, tmp_path, angles):
+    for command, words in ((plot.main, ("--out", "x.png")), (export.main, ("--movie", "x.gif"))):
+        done = call(command, "x.h5", *words, "--view", *angles)
+        assert done.returncode == 2 and "the elevation between -90 and 90" in done.err
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_film_shows_the_graph_of_the_stage(stroke):
     """The words below the axes: those of one stage for its points, other ones for those of the next stage."""
     points = [0, 4, len(stroke.points) - 1]
     assert stroke.stage_of[points].tolist() == [1, 1, 2]
-    first, again, last = (frame[-20:] for frame in frames(stroke, stroke.posed(points), 0.04, 50))
+    first, again, last = (frame[-20:] for frame in frames(stroke, stroke.posed(points), 0.04, 50, stroke.view))
     assert np.array_equal(first, again) and not np.array_equal(first, last)
 
 
