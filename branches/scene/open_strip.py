@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
 from branches.scene.meant import meant
-from branches.scene.units import STRIP_UNITS, quantity, unusual
+from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
@@ -238,6 +238,15 @@ class OpenScene(Scene):
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1)
 
+    @classmethod
+    def prepared(cls, values: dict) -> dict:
+        """Read numbers with units, as in 380 mm, which a scene with dimensions may have."""
+        if "dimensions" not in values:
+            return values
+        read = {"numbers": _in_si_units("numbers", values["numbers"])} if "numbers" in values else {}
+        stages = values["stages"]
+        return values | read | {"stages": [_stage_in_si_units(one) for one in stages] if isinstance(stages, list) else stages}
+
     @model_validator(mode="before")
     @classmethod
     def _infinite(cls, values: Any) -> Any:
@@ -420,6 +429,38 @@ class OpenScene(Scene):
     def value(self, name: str, number: float) -> str:
         """Return a number with its unit, as text."""
         return f"{exact_text(number)} {self.unit(name)}".strip()
+
+
+def _stage_in_si_units(stage: Any) -> Any:
+    """Return the fields of a stage with its numbers in SI units."""
+    if not isinstance(stage, dict):
+        return stage
+    read = {part: _in_si_units(part, stage[part]) for part in ("numbers", "limits", "label") if part in stage}
+    to = (
+        {"to": _one_in_si_units(f"stage {stage['follow']}: to", stage["follow"], stage["to"])}
+        if "to" in stage and "follow" in stage
+        else {}
+    )
+    return stage | read | to
+
+
+def _in_si_units(part: str, numbers: Any) -> Any:
+    """Return numbers by name in SI units; what is no number is left for the check of the field."""
+    if not isinstance(numbers, dict):
+        return numbers
+    return {name: _one_in_si_units(f"{part}: {name}", name, value) for name, value in numbers.items()}
+
+
+def _one_in_si_units(what: str, name: Any, value: Any) -> Any:
+    if isinstance(value, list):
+        return [_one_in_si_units(what, name, one) for one in value]
+    unit = _unit_of(name)[2] if isinstance(name, str) else ""
+    if not isinstance(value, str) or unit not in UNITS:
+        return value
+    try:
+        return quantity(value, unit)
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from error
 
 
 def _text(value: Any) -> str:

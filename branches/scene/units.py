@@ -17,10 +17,12 @@ _USUAL = {
     "youngs_modulus": (1e3, 2e12),
 }  # fmt: skip
 #: Units by the SI unit; the sign of a micrometre is one of two characters in Unicode.
-_UNITS = {
+UNITS = {
     "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u00b5m": "1e-6", "\u03bcm": "1e-6", "in": "0.0254"},
     "Pa": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"},
     "J": {"J": "1", "mJ": "1e-3", "uJ": "1e-6"},
+    "N": {"N": "1", "mN": "1e-3", "kN": "1e3"},
+    "rad": {"rad": "1", "deg": "0.017453292519943295"},
     "": {},
 }
 
@@ -38,7 +40,7 @@ def quantity(text: str, unit: str) -> float:
     >>> quantity("5mm", "m"), quantity(" .2 ", "m"), quantity("210 GPa", "Pa"), quantity("inf", "m")
     (0.005, 0.2, 210000000000.0, inf)
     """
-    units = _UNITS[unit]
+    units = UNITS[unit]
     try:
         return float(text)
     except ValueError:

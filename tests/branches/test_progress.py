@@ -198,7 +198,7 @@ def test_secondary_branches_on_a_terminal(command):
 
 
 def test_the_start_of_a_run_is_shown_until_its_first_output(monkeypatch, capsys):
-    """A first run compiles for a minute before it has anything to say."""
+    """A first run compiles for half a minute before it has anything to say."""
     terminal = a_terminal(monkeypatch)
     monkeypatch.setattr(module, "_PERIOD", 0.01)
     display = StartingDisplay()

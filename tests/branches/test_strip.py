@@ -84,6 +84,16 @@ def test_dimensions_of_scenes_with_units():
         "dimensions: {width: 20 mm, thickness: .5mm, length: 300 mm, poisson_ratio: 0.3, youngs_modulus: 200 GPa}\n"
         "material: {}\nnumbers: {distance: .29}\nbegin: arch\nstages: [{follow: distance, to: .2}]\n"
     )
+    with_units = scene.replace(".29", "29cm").replace(
+        "to: .2}", "to: 200 mm, label: {turn: [90deg]}, limits: {distance: [10cm, .3]}}"
+    )
+    plain = scene.replace("to: .2}", f"to: .2, label: {{turn: [{math.pi / 2!r}]}}, limits: {{distance: [.1, .3]}}}}")
+    assert parse(with_units, "x") == parse(plain, "x") == parse(dump(parse(with_units, "x")), "x")
+    assert set(parse(scene.replace(".29", "[29cm, 28cm]"), "x").scenes) == {"distance0.29.h5", "distance0.28.h5"}
+    with pytest.raises(ConfigError, match="x: stage distance: to: '2 inch' must be a number .in m., or one with a unit: m, cm"):
+        parse(scene.replace("to: .2", "to: 2 inch"), "x")
+    with pytest.raises(ConfigError, match="numbers.distance: must be a number, not '29cm'"):
+        parse("material: {law: flat rod, nu: .3}\n" + with_units[with_units.index("numbers") :], "x")
     assert parse(scene, "x").dimensions.model_dump() == {
         "width": 0.02, "thickness": 0.0005, "length": 0.3, "poisson_ratio": 0.3, "youngs_modulus": 200e9
     }  # fmt: skip
