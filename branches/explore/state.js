@@ -82,7 +82,7 @@ const STEADY = {
 function foldWords(branch, s) {
   const sides = [-0.5, 0.5].map((side) => stability(branch, s + side)),
     kinds = sides.map(([kind]) => kind);
-  if (kinds.includes("unknown")) return "At this fold the branch turns back.";
+  if (kinds.includes("unknown") || !kinds.includes("unstable")) return "At this fold the branch turns back.";
   if (!kinds.includes("stable"))
     return `At this fold the branch turns back. It is unstable on both sides (index ${sides.map(([, , index]) => index).join(" and ")}): no strip comes here by itself.`;
   const { way } = markAt(branch, s);
