@@ -111,6 +111,9 @@ def run(job: dict, values: dict, artifacts: Path, log: Path) -> bool:
             elif "artifact" in uses:
                 name, path = artifacts / filled(step["with"]["name"], values), copy / step["with"]["path"].partition("*")[0]
                 source, target = (path, name) if "upload" in uses else (name, path)
+                if not source.exists():
+                    print(f"no {source.name}: the job that makes it was not run", file=out)
+                    return False
                 shutil.copytree(source, target, dirs_exist_ok=True)
     return True
 
