@@ -24,8 +24,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / ".github" / "workflows"
-#: GitHub's name of machines like this one.
-HERE = {("linux", "x86_64"): "ubuntu-latest"}.get((sys.platform, platform.machine()), "none")
+#: GitHub's names of machines like this one; any Linux stands for Ubuntu.
+HERE = {("linux", "x86_64"): r"ubuntu-(latest|[\d.]+)"}.get((sys.platform, platform.machine()), "none")
 
 
 def jobs() -> Iterator[tuple[str, dict, dict]]:
@@ -45,26 +45,16 @@ def filled(text: str, values: dict) -> str:
 
 
 def value(expression: str, values: dict) -> object:
-    """Return the value of an expression: names of the matrix, texts, ``!`` and ``||``."""
-    for part in map(str.strip, expression.split("||")):
-        name = part.lstrip("!").removeprefix("matrix.")
-        found = name.strip("'") if name.startswith("'") else values.get(name)
-        if part.startswith("!"):
-            return not found
-        if found:
-            return found
-    return ""
-
-
-def wanted(step: dict, values: dict) -> bool:
-    """Return whether a step's condition holds."""
-    return "if" not in step or bool(value(step["if"].strip().removeprefix("${{").removesuffix("}}"), values))
+    """Return the value of an expression: names of the matrix and texts, with ``||`` between them."""
+    parts = (part.strip().removeprefix("matrix.") for part in expression.split("||"))
+    found = (part.strip("'") if part.startswith("'") else values.get(part) for part in parts)
+    return next(filter(None, found), "")
 
 
 def python_of(job: dict, values: dict) -> str:
     """Return the version of Python that a job asks for."""
     for step in job["steps"]:
-        if "setup-python" in step.get("uses", "") and wanted(step, values):
+        if "setup-python" in step.get("uses", ""):
             return filled(step["with"]["python-version"], values)
     return f"{sys.version_info[0]}.{sys.version_info[1]}"
 
@@ -78,7 +68,7 @@ def interpreter(version: str) -> str | None:
 def not_here(job: dict, values: dict) -> str:
     """Return why a job cannot run here; empty where it can."""
     system, version = filled(job["runs-on"], values), python_of(job, values)
-    if system != HERE:
+    if not re.fullmatch(HERE, system):
         return f"needs {system}"
     return "" if interpreter(version) else f"no Python {version}"
 
@@ -100,7 +90,7 @@ def run(job: dict, values: dict, artifacts: Path, log: Path) -> bool:
         if not command(str(interpreter(python_of(job, values))), "-m", "venv", str(venv)):
             return False
         given = {name: filled(text, values) for name, text in job.get("env", {}).items()}
-        for step in (step for step in job["steps"] if wanted(step, values)):
+        for step in job["steps"]:
             uses = step.get("uses", "")
             if "sparse-checkout" in step.get("with", {}):
                 command("git", "sparse-checkout", "set", *step["with"]["sparse-checkout"].split())
