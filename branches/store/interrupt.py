@@ -52,9 +52,19 @@ def change(kept: str) -> None:
 
 
 def run(main: Callable[[], int]) -> int:
-    """Call the ``main`` of a command; return its exit code, or that of an interrupted command."""
+    """Call the ``main`` of a command; return its exit code, or that of an interrupted command.
+
+    What contin cannot do at all, as with a variable of the environment that it does not know, is one line and the exit code 2.
+    """
     try:
         return main()
+    except Exception as error:
+        from contin import ContinError  # takes 20 ms, and is needed here only
+
+        if not isinstance(error, ContinError):
+            raise
+        print(f"error: {error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
         _say()

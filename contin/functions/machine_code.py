@@ -53,12 +53,19 @@ def machine() -> tuple[str, str]:
     The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3
     (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one elsewhere.
     ``CONTIN_PROCESSOR`` names another one.
+
+    Raises
+    ------
+    ContinError
+        It names none of these three.
     """
-    kind = platform.machine().lower()
+    kind, given = platform.machine().lower(), os.environ.get("CONTIN_PROCESSOR", "")
+    if given and given not in _PROCESSORS:
+        raise ContinError(f"CONTIN_PROCESSOR: {given!r} must be one of {', '.join(_PROCESSORS)}")
     here = "generic"
     if kind in ("x86_64", "amd64"):
         here = "x86-64-v3" if _features() >= _VERSION_3 else "x86-64"
-    return f"{sys.platform}-{kind}", os.environ.get("CONTIN_PROCESSOR") or here
+    return f"{sys.platform}-{kind}", given or here
 
 
 def _features() -> set[str]:
@@ -72,6 +79,8 @@ def _features() -> set[str]:
     return set()
 
 
+#: What machine code is made for.
+_PROCESSORS = "x86-64", "x86-64-v3", "generic"
 #: The features that x86-64-v3 has and x86-64 has not.
 _VERSION_3 = {
     "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "popcnt", "sse4_2", "ssse3", "cx16", "lahf_lm", "xsave",

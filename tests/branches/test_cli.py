@@ -116,3 +116,11 @@ def test_it_is_installed_as_ribbon(root):
 
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["scripts"] == {"ribbon": "branches.cli:main"}
+
+
+def test_a_variable_of_the_environment_that_contin_does_not_know_is_one_line(command):
+    (command.folder / "scene.yaml").write_text("{m: 1, n: 2}")
+    done = command("run", "scene.yaml", program=PROGRAM, env={"CONTIN_PROCESSOR": "x86-64-v4"})
+    assert done.returncode == 2
+    assert done.err == "error: CONTIN_PROCESSOR: 'x86-64-v4' must be one of x86-64, x86-64-v3, generic\n"
+    assert [path.name for path in command.folder.iterdir()] == ["scene.yaml"]

@@ -149,6 +149,9 @@ def test_the_code_does_not_depend_on_the_processor(monkeypatch):
     ):  # fmt: skip
         monkeypatch.setattr(machine_code, "_features", lambda features=features: features)
         assert machine_code.machine()[1] == processor
+    monkeypatch.setenv("CONTIN_PROCESSOR", "x86-64-v4")
+    with pytest.raises(ContinError, match="CONTIN_PROCESSOR: 'x86-64-v4' must be one of x86-64, x86-64-v3, generic"):
+        machine_code.machine()
 
 
 @pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="Linux tells what the processor has")
