@@ -22,6 +22,7 @@ from branches.scene.columns import NUMBER, Row
 from branches.scene.parse import dump
 from branches.scene.stage import Stage
 from branches.store.files import StoreError, no_branch, write_bytes
+from branches.store.image import image
 from branches.store.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Point
 from contin.lowlevel import Collocation, State, Stop
@@ -55,7 +56,7 @@ def _empty_file(kind: str, units: str, states: tuple[str, ...], free: tuple[str,
             data.attrs.update({name: words for name, _, words in columns})
         _create_solutions(file.create_group("solutions"), states)
         file.flush()
-        return file.id.get_file_image()
+        return image(file)
 
 
 def _create_solutions(group, names: tuple[str, ...]) -> None:
@@ -169,7 +170,7 @@ class BranchWriter:
 
     def image(self) -> bytes:
         """Return the content of the file at the last checkpoint."""
-        return self._file.id.get_file_image()
+        return image(self._file)
 
     def points(self) -> np.ndarray:
         """Return the rows of points written so far."""
