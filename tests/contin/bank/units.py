@@ -152,7 +152,7 @@ def restated(name: str, seed: int, stated: bool = False, decades: float = DECADE
     module.solve = solve
     for place in (contin, cases):
         for what in ("trace", "curve", "run_until"):
-            if what in vars(module) and what in vars(place):
+            if what in vars(module) and hasattr(place, what):
                 setattr(module, what, following(getattr(place, what)))
     return module
 
