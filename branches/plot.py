@@ -27,7 +27,7 @@ def parser() -> Parser:
     of_branch = parser.add_argument_group("a branch")
     of_branch.add_argument("--x", metavar="COLUMN", help="column across (default: the number that is followed)")
     of_branch.add_argument("--y", metavar="COLUMN", help="column upwards (default: what is conjugate to it)")
-    of_branch.add_argument("--shapes", type=int, default=6, help="number of strips drawn (default 6)")
+    of_branch.add_argument("--shapes", type=int, help="number of strips drawn (default 6)")
     of_branch.add_argument(
         "--width", type=float,
         help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, or 0.3); "
@@ -53,9 +53,9 @@ def main(argv=None) -> int:
     options = parser().parse_args(argv)
     path = Path(options.result)
     try:
-        _check(options)
-        draw = _diagram if path.is_dir() or path.suffix in (".yaml", ".yml", ".json") else _branch
-        figure, out, more = draw(options, path)
+        is_diagram = path.is_dir() or path.suffix in (".yaml", ".yml", ".json")
+        _check(options, is_diagram)
+        figure, out, more = (_diagram if is_diagram else _branch)(options, path)
         check_picture(out)
         write_picture(figure(), out)
     except (StoreError, ValueError) as error:
@@ -65,11 +65,21 @@ def main(argv=None) -> int:
     return 0
 
 
-def _check(options) -> None:
-    """Raise ValueError on an option that makes no picture."""
+#: Strips that are drawn: as many as stand side by side.
+_SHAPES = 6
+#: Options that are for a branch only, and for a diagram only.
+_OF_BRANCH, _OF_DIAGRAM = ("x", "y", "shapes", "width", "view"), ("window", "law", "nu", "plain")
+
+
+def _check(options, is_diagram: bool) -> None:
+    """Raise ValueError on an option that makes no picture, or is for results of the other kind."""
+    for name in _OF_BRANCH if is_diagram else _OF_DIAGRAM:
+        if getattr(options, name) is not None and getattr(options, name) is not False:
+            kinds = ("a branch", "a diagram") if is_diagram else ("a diagram", "a branch")
+            raise ValueError(f"--{name}: is for {kinds[0]}, and {options.result!r} is {kinds[1]}")
     if fault := view_fault(options.view):
         raise ValueError(fault)
-    if not 0 <= options.shapes <= 12:
+    if options.shapes is not None and not 0 <= options.shapes <= 12:
         raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
     if options.width is not None and not 0 < options.width <= 2:
         raise ValueError(f"--width {options.width:g}: must lie between 0 and 2")
@@ -85,7 +95,8 @@ def _branch(options, path: Path):
 
     def figure():
         axes = {name: column for name, column in (("x", options.x), ("y", options.y)) if column}
-        return read_branch(path).plot(options.shapes, options.width, view=options.view, **axes)
+        count = _SHAPES if options.shapes is None else options.shapes
+        return read_branch(path).plot(count, options.width, view=options.view, **axes)
 
     return figure, out, ""
 

@@ -153,6 +153,21 @@ def test_a_notebook_has_the_units_of_the_scene(stroke):
     assert last[1] == "EP" and float(last[5]) == pytest.approx(0.1) and float(last[6]) == pytest.approx(0.0230552, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("result", "words", "said"),
+    [
+        ("d", ("--x", "energy"), "--x: is for a branch, and 'd' is a diagram"),
+        ("d", ("--shapes", 0), "--shapes: is for a branch, and 'd' is a diagram"),
+        ("b.h5", ("--plain",), "--plain: is for a diagram, and 'b.h5' is a branch"),
+        ("b.h5", ("--nu", 0), "--nu: is for a diagram, and 'b.h5' is a branch"),
+    ],
+)
+def test_an_option_for_the_other_kind_of_result_is_refused(call, tmp_path, result, words, said):
+    (tmp_path / "d").mkdir()
+    done = call(plot.main, result, *words)
+    assert done.returncode == 2 and done.err == f"error: {said}\n"
+
+
 @pytest.mark.parametrize("angles", [(0, 91), (361, 0), (math.nan, 0)])
 def test_views_that_there_are_not(call, stroke, tmp_path, angles):
     for command, words in ((plot.main, ("--out", "x.png")), (export.main, ("--movie", "x.gif"))):
