@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import dis
 import functools
-import inspect
 import math
 import types
 from collections.abc import Callable, Iterator, Sequence
@@ -183,8 +183,8 @@ class _Object:
 
 
 def _catches(code: types.CodeType) -> bool:
-    """Return whether a function has a table of exceptions; generators always have one."""
-    return bool(getattr(code, "co_exceptiontable", b"")) and not code.co_flags & inspect.CO_GENERATOR
+    """Return whether a function handles exceptions: not those of generators, and from Python 3.12 on of lists, that pass on."""
+    return any(instruction.opname == "PUSH_EXC_INFO" for instruction in dis.get_instructions(code))
 
 
 def _may_hold_functions(value: Any) -> bool:

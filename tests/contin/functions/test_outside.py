@@ -139,3 +139,15 @@ def test_a_tuple_is_never_taken_for_an_array():
         warnings.simplefilter("error", InterpretedWarning)
         point = solve(AlgebraicProblem(lambda u, p: 2 * u - np.array([p.a, 4.0]), ["x", "y"], {"a": 1.0}), [0, 0])
     assert (point["x"], point["y"]) == (0.5, 2.0)
+
+
+def test_a_list_that_is_made_in_a_function_handles_no_exceptions():
+    """From Python 3.12 on it has an entry in the function's table of exceptions; such functions were evaluated in Python."""
+
+    def residual(u, p):
+        return [p.a * each - each**3 for each in (u.x, u.y)]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        problem = AlgebraicProblem(residual, ["x", "y"], {"a": 4.0})
+        assert solve(problem, [2.1, -2.1]).x == pytest.approx([2.0, -2.0], abs=1e-10)
