@@ -6,17 +6,17 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+# Not NDArray, which from numpy 2.5 on is an alias that shows its type only when asked: arguments are compared with these.
+Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
+ComplexArray = np.ndarray[tuple[Any, ...], np.dtype[np.complex128]]
 #: Real or complex ones.
-Numbers = NDArray[np.float64] | NDArray[np.complex128]
-Indices = NDArray[np.int64]
+Numbers = np.ndarray[tuple[Any, ...], np.dtype[np.float64]] | np.ndarray[tuple[Any, ...], np.dtype[np.complex128]]
+Indices = np.ndarray[tuple[Any, ...], np.dtype[np.int64]]
 #: One truth value an entry.
-Mask = NDArray[np.bool_]
+Mask = np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]
 #: Sparsity pattern, shape (values, inputs): which values depend on which inputs.
-Pattern = NDArray[np.bool_]
+Pattern = np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]
 #: A user's function, which the engine compiles.
 Function = Callable[..., Any]
 
