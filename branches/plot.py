@@ -65,8 +65,6 @@ def main(argv=None) -> int:
     return 0
 
 
-#: Strips that are drawn: as many as stand side by side.
-_SHAPES = 6
 #: Options that are for a branch only, and for a diagram only.
 _OF_BRANCH, _OF_DIAGRAM = ("x", "y", "shapes", "width", "view"), ("window", "law", "nu", "plain")
 
@@ -94,9 +92,8 @@ def _branch(options, path: Path):
     out = Path(options.out) if options.out else path.with_suffix(".pdf")
 
     def figure():
-        axes = {name: column for name, column in (("x", options.x), ("y", options.y)) if column}
-        count = _SHAPES if options.shapes is None else options.shapes
-        return read_branch(path).plot(count, options.width, view=options.view, **axes)
+        given = {name: getattr(options, name) for name in _OF_BRANCH}
+        return read_branch(path).plot(**{name: value for name, value in given.items() if value is not None})
 
     return figure, out, ""
 

@@ -11,12 +11,12 @@ import numpy as np
 Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
 ComplexArray = np.ndarray[tuple[Any, ...], np.dtype[np.complex128]]
 #: Real or complex ones.
-Numbers = np.ndarray[tuple[Any, ...], np.dtype[np.float64]] | np.ndarray[tuple[Any, ...], np.dtype[np.complex128]]
+Numbers = Array | ComplexArray
 Indices = np.ndarray[tuple[Any, ...], np.dtype[np.int64]]
 #: One truth value an entry.
 Mask = np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]
 #: Sparsity pattern, shape (values, inputs): which values depend on which inputs.
-Pattern = np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]
+Pattern = Mask
 #: A user's function, which the engine compiles.
 Function = Callable[..., Any]
 

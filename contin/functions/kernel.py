@@ -80,11 +80,15 @@ class Kernel:
         """The name of its machine code in the cache: a fingerprint of all that the code depends on."""
         return _fingerprint(self.entry, *_surroundings())
 
+    @functools.cached_property
+    def shipped(self) -> Callable[..., Any] | None:
+        """The function that runs the machine code that came with the package; None where there is none."""
+        return machine_code.shipped(self.entry, self.name, self.function.__doc__)
+
     def stored(self) -> Callable[..., Any] | None:
         """Return the function that runs the machine code that came with the package or is in the cache; None without any."""
-        shipped = machine_code.shipped(self.entry, self.name, self.function.__doc__)
-        if shipped is not None or not _has_compiler():
-            return shipped
+        if self.shipped is not None or not _has_compiler():
+            return self.shipped
         code = machine_code.stored(self.key)
         with contextlib.suppress(ContinError):  # a kernel that it calls may not be in the cache
             return machine_code.loaded(code, self.name, self.function.__doc__) if code else None
@@ -93,9 +97,8 @@ class Kernel:
     @functools.cached_property
     def compiled(self) -> Callable[..., Any]:
         """The function that runs the machine code; that of the kernels that it calls is loaded before."""
-        shipped = machine_code.shipped(self.entry, self.name, self.function.__doc__)
-        if shipped is not None:
-            return shipped
+        if self.shipped is not None:
+            return self.shipped
         if not _has_compiler():
             raise ContinError(_NO_COMPILER)
         code = self.code
