@@ -78,6 +78,10 @@ class DoublingCurve(MultiplierCurve):
         """Return 0: the multiplier is real."""
         return 0.0
 
+    def frequency(self, x: Array) -> float:
+        """Return the angle of the multiplier -1."""
+        return math.pi
+
     def normal_form(self, x: Array) -> Coefficient:
         """Return c."""
         return UNKNOWN if self.is_long else coefficient(self.base, x, flip)
@@ -107,7 +111,7 @@ class TorusCurve(MultiplierCurve):
         """Return sin(theta); 0 where the multipliers are real."""
         return math.sqrt(max(1 - self.kappa(x) ** 2, 0.0))
 
-    def angle(self, x: Array) -> float:
+    def frequency(self, x: Array) -> float:
         """Return the angle of the pair of multipliers."""
         return math.acos(min(max(self.kappa(x), -1.0), 1.0))
 
@@ -115,11 +119,11 @@ class TorusCurve(MultiplierCurve):
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
         if self.is_long or self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL:
             return UNKNOWN
-        return coefficient(self.base, self.inside(x), pair, self.angle(x))
+        return coefficient(self.base, self.inside(x), pair, self.frequency(x))
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, Re d, and the angle."""
-        return np.append(super().functionals(x), self.angle(x))
+        return np.append(super().functionals(x), self.frequency(x))
 
     def events(self) -> list[Event]:
         """Return those of strong resonances, Chenciner points, and folds."""
@@ -150,7 +154,7 @@ def _at_fold(label: str, name: str) -> Event:
     def confirm(trial: Trial) -> bool:
         curve: Any = trial.system
         exponents = curve.base.eigenvalues(curve.inside(trial.x))
-        own = 2 * (curve.own_unknowns and curve.angle(trial.x) < _DOUBLE)  # the pair itself is one at R1
+        own = 2 * (curve.own_unknowns and curve.frequency(trial.x) < _DOUBLE)  # the pair itself is one at R1
         known = int(curve.base.autonomous) + own
         return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
 

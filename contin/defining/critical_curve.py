@@ -66,12 +66,20 @@ class CriticalCurve(Defining):
         """Return r; 0 where the pair is real."""
 
     @abstractmethod
+    def frequency(self, x: Array) -> float:
+        """Return the imaginary part of the critical eigenvalue, or of the logarithm of the critical multiplier."""
+
+    @abstractmethod
     def coupling_slope(self, kappa: float) -> Array:
         """Return dP/dkappa."""
 
     @abstractmethod
     def normal_form(self, x: Array) -> Coefficient:
         """Return the coefficient of the normal form; unknown at the ends of the curve."""
+
+    def on_its_branch(self, x: Array) -> tuple[str, dict[str, float]]:
+        """Return the label of the point on its branch, and the frequency of the critical pair."""
+        return self.kind, {"frequency": self.frequency(x)}
 
     # --- null vectors ----------------------------------------------------------------------------------------------------
 

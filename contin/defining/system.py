@@ -120,6 +120,12 @@ class Defining(Discretization):
         """Return psi, shape (own unknowns, equations of F)."""
         return np.zeros((self.own_unknowns, self.base.equations))
 
+    def on_its_branch(self, x: Array) -> tuple[str, Any]:
+        """Return the label and the details that a point of the curve has on the branch of solutions through it."""
+        base: Any = self.base
+        inner = base.on_curve and not self.kind
+        return base.on_its_branch(self.inside(x)) if inner else (self.kind, None)
+
     # --- the equations ---------------------------------------------------------------------------------------------------
 
     def at(self, x: Array) -> Any:

@@ -50,6 +50,10 @@ class HopfCurve(CriticalCurve):
         return np.array([[0.0, -1.0], [0.0, 0.0]])
 
     def imaginary_part(self, x: Array) -> float:
+        """Return the frequency."""
+        return self.frequency(x)
+
+    def frequency(self, x: Array) -> float:
         """Return the frequency; 0 at a neutral saddle."""
         return math.sqrt(max(self.kappa(x), 0.0))
 

@@ -31,12 +31,16 @@ _SHOWN = 8
 
 
 def underlying(point: Point) -> Point:
-    """Return the solution itself of a point of a curve in two parameters; other points as they are."""
-    if not point.system.on_curve:
+    """Return the solution itself of a point of a curve in two parameters, labelled by what the curve consists of.
+
+    Other points are returned as they are.
+    """
+    curve: Any = point.system
+    if not curve.on_curve:
         return point
-    base: Any = point.system.solution
-    nowhere = np.full(base.size, np.nan)
-    return dataclasses.replace(point, label="", name="", x=point.x[: base.size], tangent=nowhere, system=base, details=None)
+    base, (label, details) = curve.solution, curve.on_its_branch(point.x)
+    x, nowhere = point.x[: base.size], np.full(base.size, np.nan)
+    return dataclasses.replace(point, label=label, name="", x=x, tangent=nowhere, system=base, details=details)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -45,10 +45,12 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
         two parameters they lead to the branch of solutions through it (where folds meet a branch point, to those that cross
-        there). With ``branch=1`` at HB and PD, those of the new branch.
+        there). With ``branch=1`` at HB and PD, those of the new branch: by default that in which the point was found, of a
+        point of a curve the first of the curve.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
-        the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from there, to the saddle. By
+        the opposite way. Every point of a curve of HB, PD or BP is such a point (of BP either may be 0). 0 is the only one
+        where no other begins. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from there, to the saddle. By
         default the one that it was found on, with ``direction`` that of the primary parameter.
     tangent : ndarray, shape (size,), optional
         Where branches cross and ``start`` does not know their tangents, as a solution that is known in closed form does
@@ -80,7 +82,8 @@ def _first(
     """Return the system of a run, its first x, the tangent there where Newton's method shall not find it, and whether branches
     cross there.
     """
-    start = start if free is None else _solution(start, checks.names("free", free))
+    if start.system.on_curve and (free is not None or branch is not None and not finding_of(start.details).is_branch_point):
+        start, free = _solution(start, free)
     system: Any = start.system
     x, way = start.x, settings.direction
     if not system.on_curve and forget_changed(system.problem):
@@ -101,7 +104,7 @@ def _first(
         return orbits, x, way * along, False
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
-    if branch is None:
+    if branch is None or (branch == 0 and not finding_of(start.details).is_branch_point):
         return system, x, _own_tangent(start, system, settings), True
     return system, x, way * _tangent(start, system, branch), True
 
@@ -128,19 +131,27 @@ def follow(
     return Branch(list(run), run.stop, run.notes)
 
 
-def _solution(start: Point, free: Sequence[str]) -> Point:
-    """Return the solution itself of a point of a curve; where folds meet a branch point, as that point of its branches."""
-    found = underlying(start)
-    if found is start or start.label != Label.BRANCH_POINT:
-        return found
-    system, x = found.system.with_free(free, found.x)  # type: ignore[attr-defined]
+def _solution(start: Point, free: Sequence[str] | None) -> tuple[Point, tuple[str, ...]]:
+    """Return the solution itself of a point of a curve, as a point of its branch, and the free parameters of that branch.
+
+    These are the first ones of the curve where none are given. Branch points, and points where folds meet one, are located.
+    """
+    found, curve = underlying(start), start.system
+    solution: Any = curve.solution
+    names = checks.names("free", curve.free[: solution.problem.free_size] if free is None else free)
+    if found.label == Label.HOPF:  # of equilibria: the parameters are those of cycles
+        return found, names
+    system, x = found.system.with_free(names, found.x)  # type: ignore[attr-defined]
+    found = dataclasses.replace(found, x=x, tangent=np.full(x.size, np.nan), system=system)
+    if Label.BRANCH_POINT not in (start.label, found.label):
+        return found, names
     try:
         point = locate_branch_point(system, x)
     except ConvergenceError:
-        return found
+        return found, names
     if not np.abs(point.x - x).max() < _HERE * (1 + np.abs(x).max()):
-        return found  # as at a fold in the other parameter
-    return dataclasses.replace(found, label=start.label, name=start.name, x=point.x, system=system, details=point)
+        return found, names  # as at a fold in the other parameter
+    return dataclasses.replace(found, label=Label.BRANCH_POINT, x=point.x, details=point), names
 
 
 def _own_tangent(start: Point, system: Discretization, settings: Settings) -> Array | None:
@@ -163,7 +174,9 @@ def _tangent(start: Point, system: Discretization, branch: int) -> Array:
     """
     known = finding_of(start.details)
     if not known.is_branch_point:
-        raise ProblemError("branch: the start is not a branch point")
+        first = "0 or 1" if switches(start) else "0"
+        labelled = f"a point labelled {start.label or 'nothing'!r}"
+        raise ProblemError(f"branch: {branch} must be {first} at {labelled}; other branches begin at BP, HB and PD")
     if set(system.free) != set(start.system.free):
         own = ", ".join(start.system.free)
         raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")

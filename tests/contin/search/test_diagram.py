@@ -22,8 +22,8 @@ def test_switching_to_the_other_branch():
             assert point["lam"] == pytest.approx(elastica_load(angle), rel=1e-10)
     with pytest.raises(ProblemError, match="between 0 and 1"):
         trace(first, branch=2)
-    with pytest.raises(ProblemError, match="not a branch point"):
-        trace(branch.points[0], branch=0)
+    with pytest.raises(ProblemError, match="branch: 1 must be 0 at a point labelled 'EP'"):
+        trace(branch.points[0], branch=1)
 
 
 def test_diagram_of_the_elastica():
