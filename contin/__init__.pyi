@@ -18,6 +18,7 @@ from .results.point import Point
 from .results.storage import load, save
 from .search.cycle import cycle
 from .search.diagram import Diagram, diagram
+from .search.further import Search
 from .search.homoclinic import homoclinic
 from .search.solving import solve
 from .search.trace import trace
@@ -28,7 +29,7 @@ __version__: str
 __all__ = [
     "auto07p", "lowlevel",
     "AlgebraicProblem", "BoundaryValueProblem", "Branch", "ConnectionProblem", "ContinError", "ConvergenceError",
-    "CycleProblem", "Diagram", "Event", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Segment",
-    "SegmentedProblem", "Settings", "VariationalProblem", "curve", "cycle", "diagram", "homoclinic", "load", "save", "solve",
-    "trace",
+    "CycleProblem", "Diagram", "Event", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Search",
+    "Segment", "SegmentedProblem", "Settings", "VariationalProblem", "curve", "cycle", "diagram", "homoclinic", "load",
+    "save", "solve", "trace",
 ]  # fmt: skip

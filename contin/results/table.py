@@ -48,17 +48,22 @@ def to_html(points: Sequence[Point], stop: object, notes: Sequence[str] = ()) ->
     parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(points)}{ended}</p>"]
     if points:
         parts += [picture(lambda axes: plot(points, axes=axes)), _of_labelled(points)]
-    parts += [f"<p>{html.escape(note)}</p>" for note in notes]
-    return f"<div>{''.join(parts)}</div>"
+    return f"<div>{''.join(parts)}{_paragraphs(notes)}</div>"
 
 
-def diagram_to_html(branches: Sequence[tuple[Sequence[Point], object]], junctions: int, draw: Callable[[Any], Any]) -> str:
-    """Return a diagram for a notebook: a picture where it can be drawn, and its branches (points, why they end), a row each."""
+def diagram_to_html(
+    branches: Sequence[tuple[Sequence[Point], object]], junctions: int, draw: Callable[[Any], Any], notes: Sequence[str] = ()
+) -> str:  # fmt: skip
+    """Return a diagram for a notebook: a picture where it can be drawn, a row a branch (points, why it ends), notes."""
     count = len(branches)
     head = f"<p><b>Diagram</b> of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}</p>"
     rows = [(f"{i}", f"{len(points)}", _labels(points), str(stop or "not ended")) for i, (points, stop) in enumerate(branches)]
     drawn = picture(draw) if any(points for points, _ in branches) else ""
-    return f"<div>{head}{drawn}{html_table(('branch', 'points', 'labels', 'end'), rows)}</div>"
+    return f"<div>{head}{drawn}{html_table(('branch', 'points', 'labels', 'end'), rows)}{_paragraphs(notes)}</div>"
+
+
+def _paragraphs(notes: Sequence[str]) -> str:
+    return "".join(f"<p>{html.escape(note)}</p>" for note in notes)
 
 
 def _labels(points: Sequence[Point]) -> str:

@@ -18,7 +18,7 @@ from contin.linalg.orientation import first_least
 from contin.results.point import Point
 
 #: Solutions no further apart than this are one; the deflated iteration ends at updates of that size.
-_SAME = 1e-6
+SAME = 1e-6
 #: A guess that is a known solution itself is moved by this part of 1 + |x|.
 _ASIDE = 0.1
 #: Where a deflated iteration starts, as multiples of the guess's distance from the nearest known solution, and its longest
@@ -40,20 +40,20 @@ def correct_away(system: Discretization, x: Array, others: Sequence[Point], newt
     known = [system.lifted(np.append(states, x[system.state_size :]), x) for states in known]
     nearest = known[first_least([inner(system, x - root, x - root) for root in known])]
     away = x - nearest
-    if np.max(np.abs(away)) < _SAME:  # the known solution itself for a guess
+    if np.max(np.abs(away)) < SAME:  # the known solution itself for a guess
         away = np.where(np.arange(x.size) < system.state_size, _ASIDE * (1 + np.abs(x)), 0.0)
     for multiple, longest in _STARTS:
         with np.errstate(all="ignore"):
-            found = _deflated(system, nearest + multiple * away, known, longest)
+            found = deflated(system, nearest + multiple * away, known, longest)
         if found is not None:
             done = correct(system, found, newton=newton)
-            if all(np.max(np.abs(done.x - system.lifted(root, done.x))) > _SAME for root in known):
+            if all(np.max(np.abs(done.x - system.lifted(root, done.x))) > SAME for root in known):
                 return done
     raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
 
 
-def _deflated(system: Discretization, x: Array, known: list[Array], longest: float) -> Array | None:
-    """Return where the deflated iteration from x converges, or None."""
+def deflated(system: Discretization, x: Array, known: list[Array], longest: float) -> Array | None:
+    """Return where the deflated iteration from x converges, or None; ``longest`` bounds its steps, relative to 1 + |x|."""
     for _ in range(_MOST_ITERATIONS):
         residual, factors = system.linearize(x)
         step = -factors.solve(residual)
@@ -67,6 +67,6 @@ def _deflated(system: Discretization, x: Array, known: list[Array], longest: flo
         if not np.isfinite(size):
             return None
         x = x + step * min(1.0, longest / size)
-        if size < _SAME:
+        if size < SAME:
             return x
     return None

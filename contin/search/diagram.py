@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+import functools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Unpack
 
@@ -20,7 +21,6 @@ from contin.core.state import Reason, Stop
 from contin.cycles.statement import CycleProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.labelled import finding_of
-from contin.functions.signature import argument_count
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import declared
@@ -30,9 +30,9 @@ from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.results.record import system_of
 from contin.search.cycle_starts import switched, switches
+from contin.search.further import Search, Searched, Site
+from contin.search.images import Symmetry, are_one, check_maps, image, seen
 from contin.shown import shown
-
-Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass
@@ -59,7 +59,7 @@ _SHOWN = 20
 
 @dataclass
 class Diagram:
-    """Branches, and the junctions where they meet.
+    """Branches, and the junctions where they meet; ``searches`` tell where disconnected solutions were looked for (`Search`).
 
     Examples
     --------
@@ -72,6 +72,7 @@ class Diagram:
 
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
+    searches: list[Searched] = field(default_factory=list)
 
     def __repr__(self) -> str:
         count, junctions = len(self.branches), len(self.junctions)
@@ -79,7 +80,13 @@ class Diagram:
         if count > _SHOWN:
             lines.append(f"  ... {count - _SHOWN} more")
         head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
-        return "\n".join([head, *lines])
+        return "\n".join([head, *lines, *self._told()])
+
+    def _told(self) -> list[str]:
+        """Return what the searches say, as lines of text."""
+        more = [f"  ... {len(self.searches) - _SHOWN} more searches"] * (len(self.searches) > _SHOWN)
+        caution = ["  What no guess leads to is not found: there may be further solutions."] * bool(self.searches)
+        return [*(f"  {each!r}" for each in self.searches[:_SHOWN]), *more, *caution]
 
     @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:
@@ -116,7 +123,7 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         branches = [(branch.points, branch.stop) for branch in self.branches]
-        return table.diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes))
+        return table.diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes), self._told())
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.
@@ -180,6 +187,11 @@ def _is_end(point: Point) -> bool:
     return bool(system.is_doubled(point.x))
 
 
+def _is_like(point: Point, start: Point) -> bool:
+    """Return whether a point is a solution of the kind that a diagram starts with: no cycle, where that is an equilibrium."""
+    return point.system.free == start.system.free and type(point.system) is type(start.system)
+
+
 def _values(point: Point) -> dict[str, float]:
     return {**point.parameters, **point.functionals}
 
@@ -191,16 +203,20 @@ class _Explorer:
         self.settings, self.tolerance, self.progress = settings, tolerance, progress
         self.symmetries = [lambda t, u: u, *symmetries]
         self.result = Diagram()
+        self._done = 0  # junctions that were left
+        self._sites: list[Site] = []  # where disconnected solutions are looked for
 
     def run(self, system: Discretization, x: Array, depth: int) -> Diagram:
-        """Follow both ways from the start, then leave every junction of less than ``depth``."""
+        """Follow both ways from the start, unless the branch is closed, then leave every junction of less than ``depth``."""
         for direction in (1, -1):
             settings = dataclasses.replace(self.settings, direction=direction)
             self._follow(self._run(system, x, settings), 0)
-        done = 0
-        while done < len(self.result.junctions):
-            junction = self.result.junctions[done]
-            done += 1
+            stop = self.result.branches[-1].stop
+            if stop is not None and stop.reason == Reason.CLOSED:
+                break
+        while self._done < len(self.result.junctions):
+            junction = self.result.junctions[self._done]
+            self._done += 1
             if junction.depth >= depth:
                 continue
             if switches(junction.point):
@@ -211,6 +227,49 @@ class _Explorer:
                     if way not in junction.taken[which]:
                         self._leave(junction, which, way, tangent)
         return self.result
+
+    def search(self, search: Search, start: Point, depth: int) -> None:
+        """Look for solutions that no branch has reached, and follow them to the same depth."""
+        primary = self.settings.primary or start.system.free[0]
+        kept = self.settings, self.symmetries, self.tolerance
+        self._sites = [Site(primary, float(value), *kept) for value in search.values]
+        for number, site in enumerate(self._sites):
+            reached = [points for branch in self.result.branches if (points := [p for p in branch if _is_like(p, start)])]
+            for points in reached:
+                site.add_from(points)
+            beside = [other for other in self._sites[max(number - 1, 0) : number + 2] if other is not site]
+            elsewhere = [point for points in reached for point in points if any(other.holds(point) for other in beside)]
+            if not elsewhere and not site.known:
+                elsewhere = [min(points, key=site.distance) for points in reached]
+            follow = functools.partial(self._follow_found, site, start, depth)
+            self.result.searches.append(site.search(search, elsewhere, number, follow))
+
+    def _follow_found(self, site: Site, start: Point, depth: int, point: Point, account: Searched) -> None:
+        """Follow a solution that a search has found both ways, and what leaves there."""
+        system: Any = point.system
+        first = len(self.result.branches)
+        try:
+            system, x = system.with_free(start.system.free, point.x)
+            self.run(system, x, depth)
+        except ConvergenceError as error:
+            account.not_followed.append(str(error))
+        fresh = self.result.branches[first:]
+        if fresh and all(len(branch) == 1 and branch.stop and branch.stop.reason == Reason.LIMIT for branch in fresh):
+            del self.result.branches[first:]
+            account.outside += 1
+        elif fresh:
+            account.branches.append(first)
+        for branch in fresh:
+            site.add_from([each for each in branch if _is_like(each, start)])
+
+    def _is_passed(self, point: Point, number: int) -> bool:
+        """Return whether a search knows a point of a run, from another branch."""
+        return any(
+            are_one((other.system, other.x), (point.system, point.x), self.symmetries, self.tolerance)
+            for site in self._sites if site.holds(point)
+            for branch in self.result.branches[:number]
+            for other in branch if _is_like(other, point) and site.holds(other)
+        )  # fmt: skip
 
     def _leave(self, junction: Junction, which: int, way: int, tangent: Array) -> None:
         point, number = junction.point, len(self.result.branches)
@@ -246,7 +305,7 @@ class _Explorer:
             branch.points.append(point)
             if place == 0 and origin is not None:
                 origin.also.append(point)
-            elif self._is_known(point, number, depth) and run.stop is None:
+            elif (self._is_known(point, number, depth) or (place and self._is_passed(point, number))) and run.stop is None:
                 branch.stop = Stop(Reason.KNOWN_BRANCH, "came to a branch that was followed before")
                 break
         branch.stop, branch.notes = branch.stop or run.stop, run.notes
@@ -296,10 +355,10 @@ class _Explorer:
     def _arrived(self, point: Point, number: int, depth: int) -> bool:
         """Note a branch point that a run passes; return True if the way ahead was followed before."""
         for junction in self.result.junctions:
-            image = self._match(junction.point, point)
-            if image is None:
+            matched = self._match(junction.point, point)
+            if matched is None:
                 continue
-            which, way = image
+            which, way = matched
             junction.also.append(point)
             junction.taken[which].setdefault(-way, number)
             if way in junction.taken[which]:
@@ -313,8 +372,8 @@ class _Explorer:
     def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
         """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images."""
         a, b = known.system, point.system
-        carry, there = b.carrier(a), _seen(a, known.x)
-        here, ahead = _seen(a, carry(point.x)), _seen(a, carry(point.details.tangents[0]))
+        carry, there = b.carrier(a), seen(a, known.x)
+        here, ahead = seen(a, carry(point.x)), seen(a, carry(point.details.tangents[0]))
         parameters = slice(a.state_size, None)
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
@@ -323,15 +382,15 @@ class _Explorer:
     def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
         """Return (tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
         system = point.system
-        return list(self._carried_onto(point, _seen(system, point.x), _seen(system, direction)))
+        return list(self._carried_onto(point, seen(system, point.x), seen(system, direction)))
 
     def _carried_onto(self, known: Point, x: Array, direction: Array) -> Iterator[tuple[int, int]]:
         """Yield (tangent, way) of a junction for each symmetry that carries x onto it, and ``direction`` along that tangent."""
         system = known.system
-        there = _seen(system, known.x)
+        there = seen(system, known.x)
         for symmetry in self.symmetries:
-            image, (turned,) = system.in_phase(_image(system, symmetry, x), (_image(system, symmetry, direction),), there)
-            gap = image - there
+            here, (turned,) = system.in_phase(image(system, symmetry, x), (image(system, symmetry, direction),), there)
+            gap = here - there
             if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, there, there))):
                 continue
             cosines = [inner(system, turned, tangent) for tangent in known.details.tangents]
@@ -339,29 +398,11 @@ class _Explorer:
             yield which, int(np.sign(cosines[which]) or 1)
 
 
-def _image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
-    """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
-    states = system.states(x).copy()
-    visible = states[:, : declared(system.problem, "dimension")]
-    visible[:] = symmetry(system.nodes, visible.copy())
-    return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
-
-
-def _seen(system: Discretization, x: Array) -> Array:
-    """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
-    problem: Any = system.problem
-    if declared(problem, "dimension") == len(problem.states):
-        return x
-    x = x.copy()
-    x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
-    x[[system.parameter_index(name) for name in problem.multipliers]] = 0.0
-    return x
-
-
 @checks.arguments
 def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Unpack[Options],
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, search: Search | None = None, progress: bool | None = None,
+    **options: Unpack[Options],
 ) -> Diagram:  # fmt: skip
     """Follow every branch that can be reached from a solution, to a given depth.
 
@@ -382,14 +423,16 @@ def diagram(
         parameters they leave alone: images of a branch count as that branch. Of autonomous cycles, shifts in time need no map.
         Those of a `VariationalProblem` map the states x, without multipliers; the ones that it declares count, too.
     tolerance : float
-        Relative distance below which two branch points are one.
+        Relative distance below which two branch points are one, and two solutions that a search finds.
+    search : Search, optional
+        Look for solutions that no branch reaches, at values of the primary parameter, and follow them, too; not of cycles.
     progress : bool, optional
         As in `trace`.
 
     Returns
     -------
     Diagram
-        Failed switches are recorded at their junction.
+        Failed switches are recorded at their junction, searches in ``searches``: a search that finds nothing is no proof.
 
     Examples
     --------
@@ -401,16 +444,38 @@ def diagram(
     """
     checks.whole("depth", depth, 0, 1000)
     checks.number("tolerance", tolerance, 0)
-    for symmetry in symmetries:
-        if argument_count(symmetry) != 2:
-            raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
+    check_maps("symmetries", symmetries)
     settings = settings_with(settings, options)
     symmetries = [*symmetries, *declared(system_of(start, "start").problem, "symmetries").values()]
     system, x = (
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )
     _check_columns(system, settings)
-    return _Explorer(settings, symmetries, tolerance, Progress(progress)).run(system, x, depth)
+    if search is not None:
+        settings = _with_values(settings, system, search)
+    explorer = _Explorer(settings, symmetries, tolerance, Progress(progress))
+    found = explorer.run(system, x, depth)
+    if search is not None:
+        explorer.search(search, found.branches[0][0], depth)
+    return found
+
+
+def _with_values(settings: Settings, system: Discretization, search: Search) -> Settings:
+    """Return settings that label the values of a search on all branches.
+
+    Raises
+    ------
+    ProblemError
+        A value outside the limits; cycles.
+    """
+    primary = settings.primary or system.free[0]
+    low, high = settings.limits.get(primary, (-np.inf, np.inf))
+    if system.is_cycle:
+        raise ProblemError("search: not of cycles; look for further ones from other starts (cycle)")
+    for value in search.values:
+        if not low <= value <= high:
+            raise ProblemError(f"search: value {value:g} must lie within the limits of {primary}, {low:g} to {high:g}")
+    return dataclasses.replace(settings, zeros={**settings.zeros, primary: [*settings.zeros.get(primary, ()), *search.values]})
 
 
 def _check_columns(system: Discretization, settings: Settings) -> None:

@@ -79,6 +79,7 @@ def calls(tmp_path_factory):
         "VariationalProblem": (contin.VariationalProblem, {
             "energy": lambda t, x, w, p: w.y**2, "states": ["y"], "parameters": {"q": 1.0}, "ends": lambda a, b, p: (a.y, b.y),
         }),
+        "Search": (contin.Search, {"values": [1.0]}),
         "Settings": (contin.Settings, {}), "MeshControl": (contin.MeshControl, {}), "Newton": (contin.Newton, {}),
         "gradient": (lowlevel.gradient, {"function": lambda x: x**2, "by": ["x"]}),
         "minimum": (lowlevel.minimum, {"potential": lambda w: w[0] ** 2, "start": [1.0]}),

@@ -1,0 +1,309 @@
+"""Disconnected solutions: deflated iterations at chosen values of a parameter, and the account of what was tried.
+
+At each value:
+
+1. Collect the solutions that are known there, of all branches followed so far; those under symmetries count as known.
+2. Start the deflated iteration (`contin.search.deflation`) from one guess after the other, from each until it finds nothing:
+   guesses that are given, states of branches at other values, known states with the sign reversed, their images under given
+   maps, and with random perturbations.
+3. Correct what it finds, adapt the mesh, and compare it with all that is known. The caller follows each new one both ways; its
+   branch is known from then on, and its states at this value are guesses, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.core.newton import correct
+from contin.core.settings import Settings
+from contin.core.system import System
+from contin.errors import ConvergenceError, ProblemError
+from contin.names import exact_text
+from contin.results.point import Point
+from contin.search.deflation import SAME, deflated
+from contin.search.guess import Guess, Options, first_guess
+from contin.search.images import Symmetry, are_one, check_maps, evenly, image
+from contin.search.solving import solved
+
+#: Longest step of a deflated iteration, relative to 1 + |x|. Of the eight solutions of Carrier's equation at 1/5, steps of .3
+#: to 10 find all, with two seeds; steps of .1 find four with one of them.
+_LONGEST = 1.0
+#: Cosines of which a random perturbation of a function of t is the sum: 0 to 3 half waves over the domain.
+_WAVES = 4
+#: A point of a branch lies at a value of the parameter that differs by less, relative to 1 + its size: it was located there.
+_AT = 1e-9
+#: Most values, draws and solutions: bounds for what users give.
+_MOST = 100_000
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where and how `diagram` looks for solutions that no branch has reached.
+
+    Attributes
+    ----------
+    values : sequence of float
+        Of the primary parameter, inside its limits. All branches of the diagram have a point (UZ) there.
+    sizes : sequence of float
+        Sizes of random perturbations of known states, relative to 1 + the size of each state.
+    draws : int
+        Perturbations of each size, for every known state. Those of a function of t are sums of four cosines.
+    guesses : sequence
+        Further guesses, as `solve` takes them, at every value.
+    maps : sequence of callable
+        Maps ``m(t, states) -> states`` of known states to guesses: symmetries that the problem has but for an imperfection. The
+        sign of known states is reversed in any case.
+    most : int
+        The search at a value ends after so many further solutions.
+    seed : int
+        Of the random perturbations: the same seed finds the same solutions.
+
+    Raises
+    ------
+    ProblemError
+
+    Examples
+    --------
+    A circle beside a line; the circle is found from the line:
+
+    >>> from contin import AlgebraicProblem, diagram, solve
+    >>> apart = AlgebraicProblem(lambda u, p: ((u.x - p.a) * ((u.x - 4)**2 + (p.a - 1)**2 - 0.25),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(apart, [0.0]), free=["a"], limits={"a": (0, 2)}, search=Search([1.0]))
+    >>> sorted(round(point["a"], 9) for point in found.branches[-1].labelled("LP")), found.branches[-1].stop.reason
+    ([0.5, 1.5], 'closed')
+    """
+
+    values: Sequence[float]
+    sizes: Sequence[float] = (0.1, 1.0)
+    draws: int = 4
+    guesses: Sequence[Any] = ()
+    maps: Sequence[Symmetry] = ()
+    most: int = 20
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, low in (("values", -np.inf), ("sizes", 0.0)):
+            for each in checks.sequence(name, getattr(self, name), "numbers"):
+                checks.number(name, each, low)
+        checks.sequence("guesses", self.guesses, "guesses, as solve takes them")
+        check_maps("maps", self.maps)
+        for name, low in (("draws", 0), ("most", 1), ("seed", 0)):
+            checks.whole(name, getattr(self, name), low, _MOST)
+
+
+@dataclass
+class Searched:
+    """The account of a search at one value of the primary parameter: what was tried, and what came of it.
+
+    Attributes
+    ----------
+    name, value : str, float
+        The parameter and its value.
+    known : int
+        Solutions there before the search, without images under symmetries.
+    guesses : mapping of str to int
+        Guesses by kind: "given", "other values", "reversed", "mapped", "random".
+    found : list of Point
+        Further solutions.
+    branches : list of int
+        Numbers of the branches that begin there.
+    outside : int
+        Solutions among ``found`` that lie outside the limits: they are not followed.
+    not_followed : list of str
+        Why branches of the others could not be followed.
+    known_again, lost : int
+        Iterations that led to known solutions, and those that did not converge.
+    stop : str
+        Why the search ended.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, diagram, solve
+    >>> apart = AlgebraicProblem(lambda u, p: ((u.x - p.a) * ((u.x - 4)**2 + (p.a - 1)**2 - 0.25),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(apart, [0.0]), free=["a"], limits={"a": (0, 2)}, search=Search([1.0]))
+    >>> (tried,) = found.searches
+    >>> tried.known, dict(tried.guesses), len(tried.found), tried.stop
+    (1, {'reversed': 3, 'random': 24}, 1, 'all guesses tried')
+    """
+
+    name: str
+    value: float
+    known: int = 0
+    guesses: Counter[str] = field(default_factory=Counter)
+    found: list[Point] = field(default_factory=list)
+    branches: list[int] = field(default_factory=list)
+    outside: int = 0
+    not_followed: list[str] = field(default_factory=list)
+    known_again: int = 0
+    lost: int = 0
+    stop: str = ""
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in self.guesses.items())
+        where = f" (branch {', '.join(map(str, self.branches))})" if self.branches else ""
+        outside = f", {self.outside} of them outside the limits" if self.outside else ""
+        failed = f"; not followed: {'; '.join(self.not_followed)}" if self.not_followed else ""
+        tried = f"{self.known} known, {len(self.found)} more found{where}{outside} from {self.guesses.total()} guesses"
+        others = f"{self.known_again} led to known ones, {self.lost} did not converge; {self.stop}{failed}"
+        return f"search at {self.name} = {exact_text(self.value)}: {tried} ({kinds or 'none'}); {others}"
+
+
+class Site:
+    """The solutions that are known at one value of the primary parameter, and the search for others there.
+
+    Parameters
+    ----------
+    primary, value : str, float
+    settings : Settings
+        Of Newton's method and the mesh.
+    symmetries : sequence of callable
+        With the identity.
+    tolerance : float
+        Relative distance below which two solutions are one.
+    """
+
+    def __init__(
+        self, primary: str, value: float, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float
+    ) -> None:
+        self.primary, self.value, self.settings = primary, value, settings
+        self.symmetries, self.tolerance = symmetries, tolerance
+        self.known: list[Point] = []
+
+    def holds(self, point: Point) -> bool:
+        """Return whether a point lies at the value."""
+        return self.distance(point) <= _AT * (1 + abs(self.value))
+
+    def distance(self, point: Point) -> float:
+        """Return how far a point is from the value."""
+        return abs(point[self.primary] - self.value)
+
+    def knows(self, point: Point) -> bool:
+        """Return whether a solution, or an image of it, is known."""
+        held = self.held(point)
+        return any(are_one(self.held(known), held, self.symmetries, self.tolerance) for known in self.known)
+
+    def add_from(self, points: Sequence[Point]) -> None:
+        """Take those points that lie at the value for known."""
+        for point in points:
+            if self.holds(point) and not self.knows(point):
+                self.known.append(point)
+
+    def search(
+        self, search: Search, elsewhere: Sequence[Point], number: int, follow: Callable[[Point, Searched], None]
+    ) -> Searched:
+        """Search from all guesses, and return the account.
+
+        Parameters
+        ----------
+        search : Search
+        elsewhere : sequence of Point
+            Solutions at other values; there is one at least, or one is known here.
+        number : int
+            Of the value: each has random numbers of its own.
+        follow : callable
+            Follows a new solution, and adds what becomes known by it.
+        """
+        account = Searched(self.primary, self.value, len(self.known))
+        for kind, system, x in self._guesses(search, elsewhere, np.random.default_rng([search.seed, number])):
+            account.guesses[kind] += 1
+            while (point := self._beside(system, x, account)) is not None:
+                account.found.append(point)
+                self.known.append(point)
+                follow(point, account)
+                if len(account.found) == search.most:
+                    account.stop = f"ended at most = {search.most}"
+                    return account
+        account.stop = "all guesses tried"
+        return account
+
+    def _guesses(
+        self, search: Search, elsewhere: Sequence[Point], random: np.random.Generator
+    ) -> Iterator[tuple[str, System, Array]]:
+        """Yield kinds of guesses and guesses, those of solutions that are found meanwhile, too."""
+        first = self.held((*self.known, *elsewhere)[0])[0]
+        for guess in search.guesses:
+            yield "given", *self._given(first, guess)
+        for point in elsewhere:
+            yield "other values", *self.held(point)
+        bases, done = ([] if self.known else elsewhere), 0
+        while done < len(bases) + len(self.known):
+            system, x = self.held([*bases, *self.known][done])
+            done += 1
+            states = np.arange(x.size) < system.state_size
+            yield "reversed", system, np.where(states, -x, x)
+            for each in search.maps:
+                yield "mapped", system, _mapped(system, each, x)
+            for size in search.sizes:
+                for _ in range(search.draws):
+                    yield "random", system, x + size * _perturbation(system, x, random)
+
+    def held(self, point: Point) -> tuple[System, Array]:
+        """Return the system of a point with the primary parameter held at the value, and the point for it."""
+        system: Any = point.system
+        held, x = system.with_free([name for name in system.free if name != self.primary], point.x)
+        found: System = held.with_parameters({self.primary: self.value})
+        return found, x
+
+    def _given(self, system: System, guess: Guess) -> tuple[System, Array]:
+        """Return a guess of the user, on a mesh like that of a known solution."""
+        values = dict(zip(system.problem.parameters, map(float, system.parameters)))
+        problem: Any = system.problem
+        return first_guess(problem, guess, Options(values, system.free, max(system.intervals, 1), system.degree))
+
+    def _beside(self, system: System, x: Array, account: Searched) -> Point | None:
+        """Return a solution that is not known, which the deflated iteration finds from x; None where it finds none."""
+        with np.errstate(all="ignore"):
+            found = deflated(system, x, self._roots(system), _LONGEST)
+            point = None
+            if found is not None:
+                with contextlib.suppress(ConvergenceError, ProblemError):
+                    point = solved(system, found, self.settings.mesh, self.settings.newton)
+        if point is None:
+            account.lost += 1
+        elif self.knows(point):
+            account.known_again += 1
+        else:
+            return point
+        return None
+
+    def _roots(self, system: System) -> list[Array]:
+        """Return the known solutions and their images as solutions of a system, each once."""
+        roots: list[Array] = []
+        for point in self.known:
+            own, x = self.held(point)
+            for number, symmetry in enumerate(self.symmetries):
+                root = own.carrier(system)(_mapped(own, symmetry, x) if number else x)
+                with contextlib.suppress(ConvergenceError):
+                    root = correct(system, root, newton=self.settings.newton).x
+                if all(np.max(np.abs(root - system.lifted(other, root))) > SAME for other in roots):
+                    roots.append(root)
+        return roots
+
+
+def _mapped(system: System, each: Symmetry, x: Array) -> Array:
+    """Return the image of a solution under a map, which is applied on a uniform mesh."""
+    even = evenly(system)
+    mapped: Array = even.carrier(system)(image(even, each, system.carrier(even)(x)))
+    return mapped
+
+
+def _perturbation(system: System, x: Array, random: np.random.Generator) -> Array:
+    """Return a random vector of the size of 1 + the states: of each number, or of each function of t a sum of cosines."""
+    n = system.scales.states.size
+    states = x[: system.state_size].reshape(-1, n)
+    if not system.is_function_of_t:
+        drawn = random.standard_normal(states.shape) * (1 + np.abs(states))
+    else:
+        nodes = system.nodes
+        part = (nodes - nodes[0]) / (nodes[-1] - nodes[0])
+        waves = np.cos(np.pi * np.outer(part, np.arange(_WAVES)))
+        drawn = waves @ random.standard_normal((_WAVES, n)) / np.sqrt(_WAVES) * (1 + np.abs(states).max(axis=0))
+    return np.append(drawn.ravel(), np.zeros(x.size - system.state_size))
