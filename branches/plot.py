@@ -12,7 +12,6 @@ from pathlib import Path
 
 from branches.store.command import Parser, complain, view_fault, write_output
 from branches.store.files import StoreError, check_picture, write_picture
-from contin.lowlevel import exact_text
 
 
 def parser() -> Parser:
@@ -112,16 +111,17 @@ def _diagram(options, path: Path):
 def choose(graph, law, nu):
     """Return the law and nu to draw: those asked for, or the first that the diagram has; and a line that says so."""
     from branches.graph.closed import families
+    from branches.scene.closed import and_nu
 
     have = sorted({family[:2] for family in families(graph)}, key=lambda pair: (pair[0] != "ribbon", pair))
     found = [pair for pair in have if law in (None, pair[0]) and nu in (None, pair[1])]
     if not found:
-        known = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in have)
+        known = "; ".join(f"{name}{and_nu(name, value)}" for name, value in have)
         asked = [f"--{name} {value}" for name, value in (("law", law), ("nu", nu)) if value is not None]
         raise StoreError(f"{' '.join(asked)}: the diagram has {known}")
     law, nu = found[0]
-    others = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in found[1:])
-    more = f"drawn: {law}, nu = {exact_text(nu)}; the diagram also has {others} (--law, --nu)\n" if others else ""
+    others = "; ".join(f"{name}{and_nu(name, value)}" for name, value in found[1:])
+    more = f"drawn: {law}{and_nu(law, nu)}; the diagram also has {others} (--law, --nu)\n" if others else ""
     return law, nu, more
 
 

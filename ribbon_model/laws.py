@@ -6,15 +6,21 @@ a second form, with the stiffnesses of an orthotropic plate in place of nu (`rib
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import os
+import re
+from collections import ChainMap
 from collections.abc import Mapping
+from pathlib import Path
 
+from contin import ProblemError
 from ribbon_model import finite_width, plate
 from ribbon_model.law import NU, Circle, Law, NoThreshold, Parameter, TwoBendings
 
 __all__ = [
     "FINITE_WIDTH", "FLAT_ROD", "ISOTROPIC_ROD", "LAWS", "OPEN_LAWS", "PAPER_LAWS", "RIBBON", "ROD", "Law", "NoThreshold",
-    "Parameter", "TwoBendings", "from_label", "label",
+    "Parameter", "TwoBendings", "laws_of",
 ]  # fmt: skip
 
 #: The ribbon's twisting modulus counts as lost where M1 + (1 - nu) kappa_n < -_STEEP |M3|, that is at |omega_3/omega_1| > 2
@@ -234,29 +240,45 @@ ROD = Law(
 PAPER_LAWS = {law.name: law for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD)}
 #: The laws of scenes of closed strips by name.
 LAWS = PAPER_LAWS | {FINITE_WIDTH.name: FINITE_WIDTH}
-#: The laws of scenes of open strips by name.
-OPEN_LAWS = LAWS | {ROD.name: ROD}
+#: The laws of scenes of open strips by name: those of closed ones, and the rod.
+OPEN_LAWS = ChainMap({ROD.name: ROD}, LAWS)
 
 
-def label(law: str, further: float | None = None) -> str:
-    """Return a law with its parameter besides nu, if it has one, as one name.
+# --- laws of users ----------------------------------------------------------------------------------------------------------
 
-    Examples
-    --------
-    >>> label("ribbon"), label("finite width", 30.0)
-    ('ribbon', 'finite width, Gamma = 30')
+#: The variable of the environment that names files with laws of users, separated as in PATH.
+VARIABLE = "RIBBON_LAWS"
+#: Names of laws: they stand in names of files, and commas separate them from parameters.
+_NAME = re.compile(r"\w[\w -]*")
+
+
+def laws_of(path: str | Path) -> dict[str, Law]:
+    """Return the laws that a Python file states, by name.
+
+    Raises
+    ------
+    contin.ProblemError
+        The file cannot be run, or states no law that can be added; one sentence.
     """
-    return law if further is None else f"{law}, {[*LAWS[law].parameters][1]} = {further:.12g}"
+    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    if spec is None or spec.loader is None or not Path(path).is_file():
+        raise ProblemError(f"{VARIABLE}: {str(path)!r} must be a Python file that states laws")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # the file may raise anything
+        raise ProblemError(f"{VARIABLE}: {str(path)!r} cannot be run: {error}") from error
+    found = [law for law in vars(module).values() if isinstance(law, Law) and OPEN_LAWS.get(law.name) is not law]
+    if not found:
+        raise ProblemError(f"{VARIABLE}: {str(path)!r} states no law: no name in it is a ribbon_model.Law")
+    for law in found:
+        if law.name in OPEN_LAWS or not _NAME.fullmatch(law.name):
+            others = ", ".join(OPEN_LAWS)
+            raise ProblemError(
+                f"{VARIABLE}: {str(path)!r}: the name {law.name!r} must be letters, digits, spaces or -, and none of {others}"
+            )
+    return {law.name: law for law in found}
 
 
-def from_label(name: str) -> tuple[Law, float | None]:
-    """Return the law and the further parameter of a `label`.
-
-    Examples
-    --------
-    >>> law, Gamma = from_label(label("finite width", 30.0))
-    >>> law.name, Gamma
-    ('finite width', 30.0)
-    """
-    law, further, value = name.partition(", ")
-    return LAWS[law], float(value.partition(" = ")[2]) if further else None
+for _path in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+    LAWS |= laws_of(_path)

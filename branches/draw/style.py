@@ -19,7 +19,7 @@ LINES: dict[bool | None, tuple[Any, str]] = {
 }  # fmt: skip
 #: Dashes of pieces of unknown stability beside others of which it is known: solid would say that they are stable.
 UNKNOWN = (0, (6, 2, 1, 2))
-NATURAL, CONJUGATE = r"natural curvature $\kappa_n L/2\pi$", r"conjugate curvature $\bar\kappa^*$"
+NU, NATURAL, CONJUGATE = r"$\nu$", r"natural curvature $\kappa_n L/2\pi$", r"conjugate curvature $\bar\kappa^*$"
 
 
 def colour_of(n: int) -> str:

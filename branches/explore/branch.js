@@ -13,7 +13,7 @@ class Branch {
     const { columns, shapes, ...rest } = about;
     Object.assign(this, rest);
     this.packed = { columns, shapes };
-    this.ruled = !(family.law || "").endsWith("rod"); // the section of a rod stays straight and at right angles to it
+    this.ruled = family.ruled !== false; // else sections stay straight and at right angles to the strip
     this.parameter = family.parameter;
     this.circle = !("file" in about);
     this.leftOut = shapes === null; // to keep the page small

@@ -18,8 +18,8 @@ from branches.store.read import read_branch
 STORED = ".npz"
 #: Files that are read without starting processes, which takes as long as reading so many.
 _ALONE = 8
-#: Folds are let go in pages of at most so many files: four ways down take two seconds.
-_LET_GO = 100
+#: Pages of at most so many files hold what takes seconds: four ways down from a fold take two, an exact solution up to seven.
+_SLOW = 100
 #: Largest size of the texts of columns and shapes on a page. With the library that draws (4.9 MB) and names it makes 30 MB.
 _MOST_BYTES = 22_500_000
 
@@ -82,7 +82,7 @@ def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict
 def _read(files: list[Path], progress: Progress) -> list[dict]:
     """Return what the page holds of the files, in their order; many files are read by several processes."""
     found: dict[Path, dict] = {}
-    read = partial(strips.branch_of, let_go=len(files) <= _LET_GO)
+    read = partial(strips.branch_of, slow=len(files) <= _SLOW)
     few = files[:1] if len(files) > _ALONE else files  # the first one loads compiled code, before processes are forked
     for path in few:
         found[path] = read(path)

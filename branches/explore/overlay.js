@@ -12,11 +12,20 @@ function listOverlays() {
   if (STRIPS)
     for (const law of [...Object.keys(EXACT_LAWS), FINITE_WIDTH])
       options.push(new Option(`exact solution: ${law}`, `exact ${law}`));
+  const { given, none } = givenExact(now.family);
+  if (given.length || none) options.push(new Option(`exact solution: ${now.family.law}`, "given"));
+  if (none && !given.length) Object.assign(options.at(-1), { text: `no exact solution: ${none}`, disabled: true });
   FAMILIES.forEach((family, i) => family !== now.family && options.push(new Option(`computed: ${family.name}`, `family ${i}`)));
   const before = $("compare").value;
   $("compare").replaceChildren(...options);
   $("compare").value = options.some(({ value }) => value === before) ? before : "";
   $("compare-bar").hidden = options.length < 2;
+}
+
+/** The exact branches of a law that the page does not know, as results came with them; and why there is none, or not all. */
+function givenExact({ branches }) {
+  const known = branches.filter(({ exact }) => exact).map(({ exact, m, n }) => ({ ...exact, m, n }));
+  return { given: known.filter(({ points }) => points), none: known.find(({ none }) => none)?.none };
 }
 
 /** Gamma of its slider, which is logarithmic, to three digits. */
@@ -27,6 +36,7 @@ function overlay() {
   const [kind, ...words] = $("compare").value.split(" "),
     which = words.join(" ");
   if (kind === "family") return { family: FAMILIES[Number(which)] };
+  if (kind === "given") return { given: givenExact(now.family).given };
   if (kind !== "exact") return null;
   return { law: which, nu: Number($("nu").value), Gamma: which === FINITE_WIDTH ? roundGamma() : undefined };
 }
@@ -49,13 +59,16 @@ async function overlayData() {
     data.lines = chosen.family.branches.filter(({ circle }) => !circle);
     return data;
   }
+  if (chosen.given) {
+    for (const { m, n, points, folds } of chosen.given) addExact(data, m, n, points.map(withElastic), folds.map(withElastic));
+    return data;
+  }
   const [low, high] = ends(now.family.branches.flatMap((branch) => [...branch.columns.kappa_n])),
     limits = [2 * low - high, 2 * high - low]; // with other parameters a branch may reach farther than the computed ones
   let last = performance.now();
   for (const [m, n] of shownModes()) {
     const { points: found, folds } = exactCurve(chosen.law, m, n, chosen.nu, limits, chosen.Gamma);
-    data.lines.push(overlayLine(found));
-    data.folds.push(...folds.map((fold) => ({ ...fold, text: `<b>exact fold of (${m}, ${n})</b>, ${overlayName()}` })));
+    addExact(data, m, n, found, folds);
     if (performance.now() - last < 100) continue;
     await new Promise(setTimeout);
     last = performance.now();
@@ -64,21 +77,30 @@ async function overlayData() {
   return data;
 }
 
+/** Add the exact branch (m, n) to what is laid over the map, with its folds. */
+function addExact(data, m, n, found, folds) {
+  data.lines.push(overlayLine(found));
+  data.folds.push(...folds.map((fold) => ({ ...fold, text: `<b>exact fold of (${m}, ${n})</b>, ${overlayName()}` })));
+}
+
 function overlayName() {
   const chosen = overlay();
+  if (chosen.given) return now.family.name;
   if (chosen.family) return chosen.family.name;
   return `${chosen.law}, ν = ${minus(String(chosen.nu))}${chosen.Gamma ? `, Γ = ${chosen.Gamma}` : ""}`;
 }
 
 const overlayText = () =>
-  overlay().family ? `computed: ${overlayName()}` : `exact solution, computed in this page: ${overlayName()}`;
+  overlay().family
+    ? `computed: ${overlayName()}`
+    : `exact solution${overlay().given ? "" : ", computed in this page"}: ${overlayName()}`;
 const overlayStroke = () => ({ color: colour("overlay"), dash: "solid", width: 1.3, simplify: false });
 const overlayEntries = () => {
   const chosen = overlay();
   if (!chosen) return [];
   return [
     { text: overlayText(), stroke: overlayStroke() },
-    ...(chosen.law ? [{ text: SYMBOLS.exact[2], symbol: "exact" }] : []),
+    ...(chosen.family ? [] : [{ text: SYMBOLS.exact[2], symbol: "exact" }]),
   ];
 };
 
@@ -92,7 +114,7 @@ function overlayTraces() {
   const values = (fold) =>
     ["kappa_n", "kappa_star"].map((name) => `<br>${AXES.get(name).brief} = ${digits(fold[name])}`).join("");
   folds.hovertext = laid.folds.map((fold) => fold.text + values(fold));
-  const shape = overlay() && overlay().law ? "spline" : "linear",
+  const shape = overlay() && !overlay().family ? "spline" : "linear",
     marker = { symbol: "star-open", size: 11, color: colour("overlay"), line: { width: 1.2 } };
   return [
     { ...QUIET, name: OVERLAY, ...line, line: { ...overlayStroke(), shape } },

@@ -16,15 +16,15 @@ from threadpoolctl import ThreadpoolController
 from branches.explore.packing import column, compressed
 from branches.explore.snaps import way_down
 from branches.explore.solutions import solutions
-from branches.scene.closed import ClosedScene, law_of
+from branches.scene.closed import ClosedScene, and_nu, law_of
 from branches.scene.labels import ON_PAGE, kind_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED
 from branches.store.read import read_kind
-from contin.lowlevel import exact_text
+from ribbon_model import exact
 from ribbon_model.domains import DOMAINS
-from ribbon_model.laws import LAWS
+from ribbon_model.laws import FINITE_WIDTH, LAWS, PAPER_LAWS
 from ribbon_model.linear import circle, covering, energy_interval, index
 from ribbon_model.solution import Solution
 
@@ -33,6 +33,11 @@ CHANNELS = ("q0", "q1", "q2", "q3", "eta", "x1", "x2", "x3")
 #: Columns of a circle, which the linear theory gives; the page makes the elastic energy, energy + kappa_n^2 / 2.
 _MAP = ("kappa_n", "kappa_star", "energy")
 CIRCLE_COLUMNS = (*_MAP, "index")
+#: Laws whose exact solutions the page computes itself, at any nu (``exact.js``, ``exact_width.js``).
+_ON_PAGE = (*PAPER_LAWS, FINITE_WIDTH.name)
+#: Largest distance between points of the exact solution of another law, as for `ribbon_model.exact.curve`. Lines through them
+#: are splines; half of it takes twice as long, and the page shows no difference.
+_EXACT_STEP = 0.2
 #: The index where a whole band of wavenumbers is unstable, which no number counts; and where it is not known.
 INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
@@ -42,10 +47,11 @@ _LOOP_NODES, _FEWEST = 384, 16
 _BEYOND, _CIRCLE_STEPS = 0.02, 6
 
 
-def branch_of(path: Path, let_go: bool = True) -> dict:
+def branch_of(path: Path, slow: bool = True) -> dict:
     """Return what the page holds of a branch file; ``family`` and ``reach`` are for `family_of` alone.
 
-    With ``let_go``, folds that a stable strip reaches have its way down from there.
+    With ``slow``, it holds what takes seconds: the ways down from folds that a stable strip reaches, and the exact solution of
+    a law that the page does not know.
 
     Raises
     ------
@@ -53,7 +59,7 @@ def branch_of(path: Path, let_go: bool = True) -> dict:
         The file cannot be read, or it holds fewer than two points.
     """
     with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-        return _branch(path, read_kind(path, CLOSED), let_go)
+        return _branch(path, read_kind(path, CLOSED), slow)
 
 
 @functools.cache
@@ -61,7 +67,7 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _branch(path: Path, branch: StoredBranch, let_go: bool) -> dict:
+def _branch(path: Path, branch: StoredBranch, slow: bool) -> dict:
     config, points = branch.config, branch.points
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
@@ -70,7 +76,7 @@ def _branch(path: Path, branch: StoredBranch, let_go: bool) -> dict:
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
     marks = [_mark(event, branch.reason, branch.scene) for event in branch.events]
     for mark, event in zip(marks, branch.events):
-        if let_go and mark["kind"] == "fold" and (way := way_down(branch, event)):
+        if slow and mark["kind"] == "fold" and (way := way_down(branch, event)):
             mark["way"] = way
         if "index_after" in event.dtype.names and event["index_after"] >= 0:
             mark["index_after"] = int(event["index_after"])
@@ -82,7 +88,20 @@ def _branch(path: Path, branch: StoredBranch, let_go: bool) -> dict:
         "marks": marks, "labels": {int(event["point"]): event["label"].decode() for event in branch.events},
         "columns": {name: column(points[name]) for name in names}, "shapes": compressed(shapes(branch)),
     }  # fmt: skip
-    return about | ({"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"]} if config["origin"] else {})
+    if config["origin"]:
+        return about | {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"]}
+    return about | ({"exact": _exact(branch.scene)} if slow and config["law"] not in _ON_PAGE else {})
+
+
+def _exact(scene: ClosedScene) -> dict:
+    """Return the exact solution of a primary branch, its columns and its folds; or ``none``, the reason why there is none."""
+    limits = scene.limits.get("kappa_n", (-100.0, 100.0))
+    try:
+        points = exact.curve(scene.m, scene.n, scene.law_parameters, limits, _EXACT_STEP, LAWS[scene.law])
+    except (ArithmeticError, RuntimeError, ValueError) as error:
+        return {"none": str(error)}
+    places = [{name: getattr(point, name) for name in _MAP} for point in points]
+    return {"points": places, "folds": [place for place, point in zip(places, points) if point.label == "LP"]}
 
 
 def _family(scene: ClosedScene) -> tuple:
@@ -103,7 +122,8 @@ def family_of(branches: list[dict]) -> dict:
     for branch in branches:
         for name in ("axes", "family", "reach", "title", *(["path"] if branch["shapes"] else [])):
             del branch[name]
-    about = {"name": f"{law}, ν = {exact_text(nu)}", "law": law, "nu": nu, "parameter": "kappa_n"}
+    ruled = law_of(law, nu)[0].has_rulings
+    about = {"name": f"{law}{and_nu(law, nu, 'ν')}", "law": law, "nu": nu, "parameter": "kappa_n", "ruled": ruled}
     return about | {"branches": branches, "circles": circles}
 
 

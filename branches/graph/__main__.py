@@ -13,9 +13,9 @@ from pathlib import Path
 
 from branches.graph import closed as diagram
 from branches.graph.stored import OPEN_FORMAT, read_any
+from branches.scene.closed import and_nu
 from branches.store.command import Parser, complain, write_output
 from branches.store.files import StoreError
-from contin.lowlevel import exact_text
 
 
 def read(path: str | Path):
@@ -76,7 +76,7 @@ def _answers(graph, options) -> Iterable[str]:
         yield graph.graph["source"]
     if options.where:
         for branch in diagram.course(graph, *options.where):
-            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: {diagram.describe(branch['nodes'])}"
+            yield f"{branch['law']}{and_nu(branch['law'], branch['nu'])}: {diagram.describe(branch['nodes'])}"
         for branch in diagram.secondaries(graph):
             if branch["family"][2:] == tuple(options.where):
                 yield f"  {diagram.describe_secondary(branch)}"
@@ -88,7 +88,7 @@ def _answers(graph, options) -> Iterable[str]:
         found = list(diagram.courses(graph))
         yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
         for (law, nu, m, n), nodes in found:
-            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
+            yield f"  {law}{and_nu(law, nu)}, ({m}, {n}): {diagram.describe(nodes)}"
 
 
 def _folds(graph, low: float, high: float) -> Iterable[str]:
@@ -101,7 +101,7 @@ def _folds(graph, low: float, high: float) -> Iterable[str]:
     for data in found:
         branch = f"{'secondary ' * data['secondary']}branch ({data['m']}, {data['n']})"
         place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
-        yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold of {branch} at {place}"
+        yield f"{data['law']}{and_nu(data['law'], data['nu'])}: fold of {branch} at {place}"
 
 
 def _states(graph, options) -> Iterable[str]:
@@ -114,7 +114,7 @@ def _states(graph, options) -> Iterable[str]:
         what = f"{about['circle']}-covered circle" if "circle" in about else f"branch {about['branch']}"
         what = f"secondary {what}, from {about['origin']:.6f}" if "origin" in about else what
         values = f"kappa* = {state.words('kappa_star')}, energy = {state.words('energy')}"
-        yield f"{about['law']}, nu = {exact_text(about['nu'])}: {what}, {values}"
+        yield f"{about['law']}{and_nu(about['law'], about['nu'])}: {what}, {values}"
 
 
 def _of_open_strips(graph, options) -> Iterable[str]:

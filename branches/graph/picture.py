@@ -7,10 +7,11 @@ from itertools import groupby
 
 import numpy as np
 
-from branches.draw.style import CONJUGATE, LINES, NATURAL, OTHER, colour_of, in_words, smooth
+from branches.draw.style import CONJUGATE, LINES, NATURAL, NU, OTHER, colour_of, in_words, smooth
 from branches.graph import disentangle as layered
 from branches.graph.closed import families, pieces, secondaries
 from branches.graph.names import name_lines
+from branches.scene.closed import and_nu
 from branches.scene.labels import END, MARKS
 
 STABLE, UNSTABLE = "#000000", "#8a8a8a"
@@ -127,7 +128,7 @@ def figure(graph, law: str, nu: float, window=None, disentangle: bool = True):
     handles = legend(graph, law, nu, window)
     columns = 3 if max(len(handle.get_label()) for handle in handles) > _LONG else 5
     result.legend(handles=handles, loc="outside lower center", ncols=columns if disentangle else 2, frameon=False, fontsize=12)
-    result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {in_words(nu)}{note(graph)}", fontsize=15)
+    result.suptitle(f"Equilibria of a closed strip: {law}{in_words(and_nu(law, nu, NU))}{note(graph)}", fontsize=15)
     blob = _blob(found, window)
     if blob:  # below the lowest circle there is room
         panels[0].set_ylim(bottom=panels[0].get_ylim()[0] - _BELOW)

@@ -13,10 +13,10 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.stored import new_graph
+from branches.scene.closed import and_nu
 from branches.scene.fields import Scene
 from branches.scene.labels import kind_of
 from branches.scene.sweep import Sweep
-from contin.lowlevel import exact_text
 from ribbon_model import exact
 
 SOURCE = "preview: exact quadrature"
@@ -47,7 +47,7 @@ def preview(scene: Scene | Sweep, step: float = 0.2):
         try:
             points = exact.curve(one.m, one.n, one.law_parameters, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
         except (ValueError, RuntimeError) as error:
-            failed[f"{one.material}, nu = {exact_text(one.nu)}, ({one.m}, {one.n})"] = str(error)
+            failed[f"{one.material}{and_nu(one.material, one.nu)}, ({one.m}, {one.n})"] = str(error)
             continue
         _add(graph, family, points)
     graph.graph |= {"source": SOURCE, "failed": json.dumps(failed), "absent": json.dumps(scene.absent)}

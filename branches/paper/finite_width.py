@@ -20,7 +20,7 @@ from branches.scene.parse import parse
 from contin import Settings, curve, trace
 from contin.lowlevel import point_of
 from ribbon_model import exact
-from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, label
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.linear import thresholds
 from ribbon_model.seeds import primary_branch
 
@@ -137,7 +137,7 @@ def _draw_diagrams(graph, folder: Path) -> str:
 
     figure = Figure(figsize=(15, 6), layout="constrained")
     panels = figure.subplots(1, len(GAMMAS) + 1, sharex=True, sharey=True)
-    names = [*(label("finite width", Gamma) for Gamma in GAMMAS), label("ribbon")]
+    names = [*(f"{FINITE_WIDTH.name}, Gamma = {Gamma:.12g}" for Gamma in GAMMAS), RIBBON.name]
     for axes, name, Gamma in zip(panels, names, (*GAMMAS, None)):
         conjugate(axes, graph, name, NU, WINDOW)
         axes.set(title="ribbon, Γ = ∞" if Gamma is None else f"Γ = {Gamma:g}", xlabel=NATURAL)

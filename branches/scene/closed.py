@@ -53,6 +53,17 @@ def law_of(material: str, nu: float) -> tuple[Law, dict[str, float]]:
     return law, ({"nu": nu} if "nu" in law.parameters else {}) | {key: float(value) for key, value in pairs}
 
 
+def and_nu(material: str, nu: float, letter: str = "nu") -> str:
+    """Return the end of a strip's name, behind its material: its nu, '' for a law without.
+
+    Examples
+    --------
+    >>> and_nu("finite width, Gamma = 30", 0.3)
+    ', nu = 0.3'
+    """
+    return f", {letter} = {exact_text(nu)}" if "nu" in LAWS[material.partition(", ")[0]].parameters else ""
+
+
 class ClosedScene(Scene):
     """One branch: that of the mode of wavenumber n on the m-covered circle, or a secondary branch that leaves it."""
 
@@ -141,8 +152,7 @@ class ClosedScene(Scene):
     @property
     def name(self) -> str:
         what = "secondary branch from " if self.origin else ""
-        nu = f", nu = {exact_text(self.nu)}" if "nu" in LAWS[self.law].parameters else ""
-        return f"{self.material}, {what}(m, n) = ({self.m}, {self.n}){nu}"
+        return f"{self.material}, {what}(m, n) = ({self.m}, {self.n}){and_nu(self.law, self.nu)}"
 
     @property
     def heading(self) -> str:
@@ -232,7 +242,7 @@ class ClosedScene(Scene):
     @classmethod
     def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
         law = _material(fields.get("law", RIBBON.name), fields.get("Gamma"), fields.get("parameters", {}))
-        return f"{law}, nu = {exact_text(fields.get('nu', 0.3))}, ({fields['m']}, {fields['n']})"
+        return f"{law}{and_nu(law, fields.get('nu', 0.3))}, ({fields['m']}, {fields['n']})"
 
     @classmethod
     def same_name(cls, words: str, a: ClosedScene, b: ClosedScene) -> str:

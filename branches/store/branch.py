@@ -108,9 +108,9 @@ class StoredBranch(ABC):
         return self.stages[0].columns()
 
     @property
-    @abstractmethod
     def about(self) -> str:
         """The branch in words."""
+        return self.scene.title_or_name
 
     @property
     @abstractmethod
@@ -263,9 +263,9 @@ class StoredBranch(ABC):
     # --- pictures -------------------------------------------------------------------------------------------------------
 
     @property
-    @abstractmethod
     def caption(self) -> str:
         """What a picture shows, in words."""
+        return self.about
 
     @functools.cached_property
     def panels(self) -> list[tuple[str, str]]:

@@ -11,10 +11,10 @@ import numpy as np
 from branches.draw.shapes import flat_across
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, WIDTH, steady
-from branches.draw.style import colour_of, in_words
+from branches.draw.style import NU, colour_of, in_words
+from branches.scene.closed import and_nu
 from branches.scene.labels import kind_of, label_of
 from branches.store.branch import Mark, StoredBranch
-from contin.lowlevel import exact_text
 from ribbon_model.domains import DOMAINS, LOOP
 from ribbon_model.laws import LAWS
 from ribbon_model.shape import Shape
@@ -33,11 +33,6 @@ class ClosedBranch(StoredBranch):
     """The result file of a closed strip; lengths of shapes are in units of L / 2 pi."""
 
     shape_length: ClassVar[float] = 2 * math.pi
-
-    @property
-    def about(self) -> str:
-        scene = self.scene
-        return f"{scene.material}, (m, n) = ({scene.m}, {scene.n}), nu = {exact_text(scene.nu)}"
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -82,7 +77,7 @@ class ClosedBranch(StoredBranch):
             sizes = " × ".join(f"{1e3 * scene.strip[name]:.4g}" for name in ("width", "thickness", "length"))
             what = f"strip of {sizes} mm"
         secondary = "secondary branch of " if scene.origin else ""
-        return f"{what}, {secondary}(m, n) = ({scene.m}, {scene.n}), $\\nu$ = {in_words(scene.nu)}"
+        return f"{what}, {secondary}(m, n) = ({scene.m}, {scene.n}){in_words(and_nu(scene.law, scene.nu, NU))}"
 
     def measured(self, name: str) -> tuple[np.ndarray, str]:
         """As `StoredBranch.measured`; curvatures are in 1/m if the scene has the sizes of its strip."""

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from branches.draw.shapes import standing
+from branches.draw.shapes import flat_across, standing
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, SIDE, View
 from branches.scene.labels import without_round_off
@@ -56,7 +56,7 @@ class OpenBranch(StoredBranch):
         """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
         material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
         strains = self._strains(point, t, states)
-        shape = shape_of(t, states, strains if material.form.has_rulings else np.zeros((len(t), 3)))
+        shape = flat_across(shape_of(t, states, strains), material.form)
         along = {
             field: np.array([float(material.datum(name)(s, numbers)) for s in t])
             for field, name in (("breadth", "width"), ("depth", "thickness")) if name in material.along
@@ -108,21 +108,12 @@ class OpenBranch(StoredBranch):
         return tuple(-x for x in strip.weight_direction) if self.is_heavy else DIRECTIONS["normal"]
 
     @property
-    def about(self) -> str:
-        """The strip in words."""
-        return self.scene.title or self.scene.name
-
-    @property
     def shown(self) -> tuple[str, ...]:
         """Columns of labelled points that a notebook shows."""
         followed = dict.fromkeys(stage.follow for stage in self.scene.stages)
         return ("point", "label", "name", "stage", *followed, "energy", "index")
 
     # --- pictures -------------------------------------------------------------------------------------------------------
-
-    @property
-    def caption(self) -> str:
-        return self.about
 
     def colour(self, stage: int) -> str:
         return PALETTE[(stage - 1) % len(PALETTE)]

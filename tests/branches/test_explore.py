@@ -30,8 +30,9 @@ from branches.run.runner import run_scene
 from branches.scene.closed import ClosedScene
 from branches.scene.parse import parse
 from branches.store.files import StoreError
-from ribbon_model import exact
+from ribbon_model import exact, laws
 from ribbon_model.descent import past
+from ribbon_model.law import Law, Parameter
 
 FIG_12 = "{title: Fig. 12a, law: ribbon, nu: 0.3, m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], stride: 10}"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -228,7 +229,7 @@ def test_only_folds_of_stable_strips_have_a_way_down(pages, unstable_folds, resu
     energies = column(way, "energy")
     assert (np.diff(energies) < 0).all() and energies[-1] == pytest.approx(way["ends"][0]["energy"], abs=1e-2)
     assert ways(data_of(unstable_folds)) == ways(data_of(pages / "fig12.html")) == []
-    monkeypatch.setattr(gather_module, "_LET_GO", 0)
+    monkeypatch.setattr(gather_module, "_SLOW", 0)
     assert ways(gather_module.gather([str(results / "m1_n2.h5")])) == []
 
 
@@ -595,6 +596,36 @@ def test_compare_with_another_material(pages, browser):
     browser.js(choose.format("compare", "exact finite width", "onchange"))
     browser.until(f"{legend}.includes('finite width')")
     assert browser.js("document.documentElement.scrollWidth") <= 380  # the longest entry of a legend
+    assert browser.errors == []
+
+
+@needs_chromium
+def test_the_exact_solution_of_a_law_of_one_s_own_comes_with_the_page(tmp_path, browser, monkeypatch):
+    """Its fold is that of the branch; a law with an omega_2 has no quadrature, and the page says so."""
+
+    def energy(w1, w2, w3, kappa_n, twist, side):
+        return (w1 - kappa_n) ** 2 / 2 + (w1 - kappa_n) ** 4 / 25 + side * w2**2 / 2 + twist * w3**2 / 2 - kappa_n**2 / 2
+
+    for constrained, name in ((True, "stiffening"), (False, "with a side")):
+        law = Law.of_energy(name, energy, {"twist": Parameter(), "side": Parameter()}, constrained)
+        monkeypatch.setitem(laws.LAWS, name, law)
+        scene = parse(f"{{law: {name}, parameters: {{twist: 1.5, side: 2}}, m: 1, n: 2}}", "scene")
+        run_scene(scene, tmp_path / f"{name}.h5", Display(silent=True))
+        assert main([str(tmp_path / f"{name}.h5"), "--out", str(tmp_path / f"{name}.html")]) == 0
+    browser.open(tmp_path / "stiffening.html")
+    assert (
+        browser.js("document.getElementById('compare').options[5].text") == "exact solution: stiffening, twist = 1.5, side = 2"
+    )
+    browser.js("(() => { const e = document.getElementById('compare'); e.value = 'given'; e.onchange(); })()")
+    folds = "document.getElementById('diagram').data.find(({name}) => name === 'overlay folds').x"
+    browser.until(f"{folds}.length === 1")
+    (fold,) = (event["kappa_n"] for event in read_branch(tmp_path / "stiffening.h5").events if event["label"] == b"LP")
+    assert browser.js(f"{folds}[0]") == pytest.approx(fold, abs=1e-8)
+    assert browser.js("document.getElementById('nu-label').hidden")
+    assert "ν" not in browser.js("document.getElementById('legend').textContent")
+    browser.open(tmp_path / "with a side.html")
+    text, disabled = browser.js("(({text, disabled}) => [text, disabled])(document.getElementById('compare').options[5])")
+    assert disabled and text == "no exact solution: the law 'with a side' has an omega_2: there is no such quadrature"
     assert browser.errors == []
 
 

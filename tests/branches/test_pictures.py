@@ -73,7 +73,7 @@ def test_the_script_says_which_family_it_draws(tmp_path, call):
     run_many(scene, tmp_path / "two", Display(silent=True))
     main = plot.main
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
-    assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
+    assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon, nu = 0.31 (--law, --nu)\n")
     assert call(main, tmp_path / "two", "--out", "x.png", "--plain", "--nu", "0.31").out == "written to x.png\n"
 
 

@@ -2,12 +2,14 @@
 
 import dataclasses
 import json
+import re
 import signal
 
 import h5py
 import numpy as np
 import pytest
 
+import contin
 from branches.explore.gather import gather
 from branches.graph.kinds import graph_kind
 from branches.graph.stored import new_graph, save
@@ -21,7 +23,6 @@ from branches.scene.parse import dump, load, parse
 from branches.scene.stages import stages_of
 from branches.store.read import read_branch
 from ribbon_model import laws
-from ribbon_model.law import Law, Parameter
 
 COARSE = "mesh: {degree: 5, tolerance: 1.0e-7}\n"
 
@@ -135,15 +136,24 @@ def test_any_column_of_an_open_strip_against_any_other(tmp_path, root):
         branch.plot(shapes=0, y="M_up")
 
 
+LAW = """
+from ribbon_model import RIBBON, Law, Parameter
+
+
 def quartic(w1, w2, w3, kappa_n, twist, core):
     bent = w1 - kappa_n
     return bent**2 / 2 + core**2 * bent**4 / 4 + twist * w3**2 / 2 - kappa_n**2 / 2
 
 
-def test_a_law_of_ones_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_path, monkeypatch):
+QUARTIC = Law.of_energy("quartic", quartic, {"twist": Parameter(), "core": Parameter(1)})
+"""
+
+
+def test_a_law_of_one_s_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_path, monkeypatch):
     """It has a length of its own and no nu. (1, 2) leaves the circle where M r0 = t (1 - n^2/m^2) with the moment M there."""
-    law = Law.of_energy("quartic", quartic, {"twist": Parameter(), "core": Parameter(1)})
-    monkeypatch.setitem(laws.LAWS, law.name, law)
+    (tmp_path / "quartic.py").write_text(LAW)
+    for name, law in laws.laws_of(tmp_path / "quartic.py").items():
+        monkeypatch.setitem(laws.LAWS, name, law)
     text = "law: quartic\nm: 1\nn: 2\nparameters: {twist: 1.5, core: [0.1, 0.4]}\nlimits: {kappa_n: [-10, 10]}\n"
     sweep = parse(text + COARSE, "scene")
     assert list(sweep.scenes) == ["quartic_twist1.5_core0.1_m1_n2.h5", "quartic_twist1.5_core0.4_m1_n2.h5"]
@@ -153,6 +163,9 @@ def test_a_law_of_ones_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_
         bent = 1 - start["kappa_n"]
         assert bent + core**2 * bent**3 == pytest.approx(1.5 * (1 - 2**2), rel=1e-9)
     page = gather([str(tmp_path)])
+    assert [branch["exact"]["points"][0]["kappa_n"] for family in page["families"] for branch in family["branches"]] == [
+        pytest.approx(read_branch(tmp_path / file).events["kappa_n"][0], abs=1e-9) for file in sweep.scenes
+    ]
     assert [family["law"] for family in page["families"]] == [
         "quartic, twist = 1.5, core = 0.1",
         "quartic, twist = 1.5, core = 0.4",
@@ -160,6 +173,46 @@ def test_a_law_of_ones_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_
     assert all(len(family["circles"]) == 2 for family in page["families"])
     with pytest.raises(ConfigError, match="twist"):
         parse(text.replace("twist: 1.5, ", ""), "scene")
+
+
+def test_a_file_with_a_law_is_all_that_commands_need(tmp_path, command):
+    """Closed and open strips: at the moment 4 the open one is an arc whose bending y satisfies y + core^2 y^3 = 4."""
+    (tmp_path / "quartic.py").write_text(LAW)
+    (tmp_path / "closed.yaml").write_text("law: quartic\nm: 1\nn: 2\nparameters: {twist: 1.5, core: 0.4}\n")
+    (tmp_path / "open.yaml").write_text(
+        "material: {law: quartic, twist: 1.5, core: 0.4, kappa_n: 0.5}\nfinish: {rotation: hinged, about: width, place: free}\n"
+        "stages: [{follow: moment, to: 4}]\n"
+    )
+    env = {"RIBBON_LAWS": "quartic.py"}
+    assert "leaves the 1-covered circle at kappa_n L/2pi = 3.370" in command("closed.yaml", env=env).out
+    done = command("closed.h5", program=("-m", "branches.plot"), env=env)
+    assert (done.returncode, done.out) == (0, "written to closed.pdf\n")
+    preview = command("closed.yaml", program=("-m", "branches.graph"), env=env).out
+    assert "quartic, twist = 1.5, core = 0.4, (1, 2): circle 1 at 3.370" in preview
+    assert command("open.yaml", env=env).returncode == 0
+    with h5py.File(tmp_path / "open.h5") as file:
+        energy = file["points"]["energy"][-1]
+    y = max(root.real for root in np.roots([0.4**2, 0, 1, -4]) if not root.imag)
+    assert energy == pytest.approx(y**2 / 2 + 0.4**2 * y**4 / 4, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "must be a Python file that states laws"),
+        ("1 / 0", "cannot be run: division by zero"),
+        ("from ribbon_model import RIBBON", "states no law: no name in it is a ribbon_model.Law"),
+        (LAW.replace('"quartic"', '"ribbon"'), "the name 'ribbon' must be letters, digits, spaces or -, and none of ribbon,"),
+        (LAW.replace('"quartic"', '"a, b"'), "the name 'a, b' must be"),
+    ],
+)
+def test_a_file_with_a_law_that_cannot_be_used(text, said, tmp_path):
+    path = tmp_path / "law.py"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(contin.ProblemError, match=re.escape(said)) as caught:
+        laws.laws_of(path)
+    assert str(caught.value).startswith("RIBBON_LAWS: ") and "law.py" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["m1_n2", "open_tip"])

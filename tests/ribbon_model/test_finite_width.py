@@ -12,7 +12,7 @@ from contin import Settings, trace
 from contin.lowlevel import point_of
 from ribbon_model import convexity, exact_finite_width, finite_width
 from ribbon_model.domains import HALF_LOOP
-from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings, from_label, label
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings
 from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
 from ribbon_model.seeds import half_loop_branch, primary_branch
 from ribbon_model.solution import Solution
@@ -228,12 +228,11 @@ def test_the_half_loop_bifurcates_at_the_thresholds():
     assert [index(FINITE_WIDTH, 1, k, wide(10.0)) for k in (3.3, 3.4, 4.5, 6.0)] == [0, 2, 4, math.inf]
 
 
-def test_covering_indices_and_names():
+def test_covering_indices():
     for m, kappa_n in ((1, 4.0), (3, -0.5), (5, 30.0)):
         for law, Gamma in ((RIBBON, None), (FINITE_WIDTH, 0.0), (FINITE_WIDTH, 7.0)):
             values = circle(law, m, kappa_n, wide(Gamma))
             assert covering(law, wide(Gamma), kappa_n, values["kappa_star"], values["energy"]) == m
-            assert from_label(label(law.name, Gamma)) == (law, Gamma)
     for law, Gamma in ((RIBBON, 1.0), (FINITE_WIDTH, None), (FINITE_WIDTH, -1.0)):
         with pytest.raises(ValueError, match="Gamma"):
             thresholds(law, 1, 2, wide(Gamma))
