@@ -106,6 +106,8 @@ class Continuation:
         self._tests = [*general, *self._own]
         self._meshes = MeshPolicy(self._steps, general)
         self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
+        if conserved := getattr(system.solution.problem, "conserved", ""):
+            self._notes.add(conserved)
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import weakref
 from collections import namedtuple
@@ -17,7 +18,7 @@ from contin.collocation.degree import CYCLE_DEGREE
 from contin.core.scales import Scales
 from contin.cycles.symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
 from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
-from contin.equilibria.statement import AlgebraicProblem
+from contin.equilibria.statement import AlgebraicProblem, ReducedProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
@@ -29,6 +30,9 @@ from contin.problems.vector_field import check_field, found_elsewhere, of_parame
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
 _AUTONOMOUS = "must be a function of (u, p); one of (t, u, p) needs a period"
+
+#: Name of the time among the parameters of a forced field at rest: no user's parameter has it.
+_TIME = "time_of_the_forcing"
 
 #: The period of a forcing: a number, the name of a parameter, or a function of the parameters.
 Period = float | str | Callable[[Any], Any]
@@ -199,6 +203,34 @@ class CycleProblem(BoundaryValueProblem):
             _STATED[problem] = found
         return found
 
+    @functools.cached_property
+    def reduced(self) -> ReducedProblem | None:
+        """The equilibria of the field with conserved totals as parameters; None where nothing is conserved.
+
+        Raises
+        ------
+        ProblemError
+            A total is conserved by a forced field, or by one whose symmetry is stated.
+        """
+        own = (PERIOD, ROUNDS, *winding_names(self.angles))
+        parameters = {name: value for name, value in self.parameters.items() if name not in own}
+        field = self.field if self.period is None else _at_time(self.field, tuple(parameters))
+        time = {} if self.period is None else {_TIME: 0.0}
+        means = self.means if self.period is None else {}
+        found = AlgebraicProblem(field, self.state_names, {**parameters, **time}, means, angles=self.angles).reduced
+        if found is not None and (self.period is not None or self.order > 1):
+            what, totals = "a forced field" if self.period is not None else "a field with a symmetry", found.conserved
+            states = checks.listed(found.following)
+            raise ProblemError(
+                f"field: {totals.partition(':')[0]}; state {what} without {states}, with the total as a parameter in its place"
+            )
+        return found
+
+    @property
+    def on_totals(self) -> CycleProblem:
+        """The same cycles with conserved totals as parameters, or the problem itself where nothing is conserved."""
+        return self if self.reduced is None else CycleProblem.of(self.reduced)
+
     def doubled(self) -> CycleProblem:
         """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.
 
@@ -263,6 +295,12 @@ class CycleProblem(BoundaryValueProblem):
         if self.period is not None:
             return _of_forcing(function, self.period)
         return _of_time(function) if self.order == 1 else averaged(function, self.symmetry, self.state_names, self.order)
+
+
+def _at_time(field: Function, names: Sequence[str]) -> Function:
+    """Return a forced field as one whose time is a parameter."""
+    known: Any = namedtuple("P", names)  # type: ignore[misc]  # noqa: PYI024
+    return lambda u, p: field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in names)))
 
 
 def _turn(symmetry: Any, forced: bool, count: int) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,9 @@ _PLACES, _SEED = 3, 7
 #: How far these are apart, relative to 1 + |u|. Ten times nearer, null vectors that turn slowly would count as fixed; ten times
 #: further, more places are outside of the domain of the equations.
 _APART = 0.1
+#: Sizes of the states at places where a total must stay, one after the other: conditions on states, such as a threshold, would
+#: have to lie beyond all of them to be missed.
+_SIZES = (1.0, 0.1, 3.0, 10.0, 100.0)
 #: A singular value is zero below so many units in the last place of the largest, times the size of the matrix.
 _ZERO_UNITS = 10.0
 #: Parts of a null vector below this are round-off, and so is the value of a combination of equations relative to its terms.
@@ -48,6 +52,35 @@ def dependence(system: AlgebraicEquations, x: Array) -> str:
     equations = _reduced(_null_vectors(np.hstack(matrices).T))
     states = _reduced(_null_vectors(np.vstack(matrices)))
     return _of_equations(system, places, equations, bool(len(states))) or _of_states(system, states)
+
+
+def conservation_laws(problem: Any) -> Array:
+    """Return the totals that no motion of u' = F changes, (m, n): rows w with w.F = 0 whatever states and parameters are.
+
+    Each total has a state of its own, with the factor 1: rows are in reduced echelon form. Of the forms that the first and
+    the last states lead to, that with fewer negative factors is taken. Angles have no totals.
+    """
+    n = len(problem.state_names)
+    none = np.empty((0, n))
+    if not problem.dynamics or n > MOST_STATES:
+        return none
+    random = np.random.default_rng(_SEED)
+    columns: list[Array] = []
+    for size in _SIZES:
+        p = {name: value + _APART * (1 + abs(value)) * random.uniform(0.1, 1.0) for name, value in problem.parameters.items()}
+        system, u = problem.discretized((), p), size * random.uniform(0.1, 1.0, n)
+        with contextlib.suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):
+            matrix, rates = system.jacobian(u), system.residual(u)
+            if not (np.isfinite(matrix).all() and np.isfinite(rates).all()):
+                continue
+            if not columns and not DenseFactors(_balanced(matrix)[0]).reciprocal_condition <= _zero(n):
+                return none
+            columns += [matrix, rates[:, None]]
+    vectors = _null_vectors(np.hstack(columns).T) if len(columns) >= 2 * _PLACES else none
+    forms = [_reduced(vectors), _reduced(vectors[:, ::-1])[:, ::-1]]
+    fewest: Array = min(forms, key=lambda form: np.count_nonzero(form < 0))
+    found: Array = np.where(np.abs(fewest - np.rint(fewest)) < _LEAST, np.rint(fewest), fewest)
+    return none if any(problem.angles.get(problem.state_names[i]) for i in np.flatnonzero(found.any(axis=0))) else found
 
 
 def _around(system: AlgebraicEquations, x: Array) -> list[Array]:
@@ -114,11 +147,11 @@ def _of_equations(system: AlgebraicEquations, places: Sequence[Array], vectors: 
         terms = vector * residuals
         value = float(terms.sum(axis=1).mean())
         if abs(value) > _LEAST * np.abs(terms).max():
-            what = f"{_written(vector, numbers)} is {value:.6g} whatever the states are"
+            what = f"{written(vector, numbers)} is {value:.6g} whatever the states are"
             return f"residual: {what}: there is no solution, unless a parameter takes this number to zero"
-    combined = checks.listed(_written(vector, numbers) for vector in vectors)
+    combined = checks.listed(written(vector, numbers) for vector in vectors)
     replaced = checks.listed(numbers[_first(vector)] for vector in vectors)
-    totals = checks.listed(_written(vector, names) for vector in vectors)
+    totals = checks.listed(written(vector, names) for vector in vectors)
     what = f"{combined} {'is' if len(vectors) == 1 else 'are'} 0 whatever the states are"
     condition = "a condition that fixes" if len(vectors) == 1 else f"{len(vectors)} conditions that fix"
     held = " (or holds one state)" if is_shifted else ""
@@ -136,7 +169,7 @@ def _of_states(system: AlgebraicEquations, vectors: Array) -> str:
     return f"{what}: add the equation that {held} is held, and free a parameter"
 
 
-def _written(vector: Array, names: Sequence[str]) -> str:
+def written(vector: Array, names: Sequence[str]) -> str:
     """Return a combination of names, such as "x + 2 y"."""
     text = ""
     places = np.flatnonzero(vector)

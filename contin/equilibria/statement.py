@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, cast
 
@@ -14,6 +14,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function, Places
 from contin.core.scales import Scales
+from contin.equilibria.dependence import conservation_laws, written
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError, warn
 from contin.functions import round_off
@@ -21,11 +22,18 @@ from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
+from contin.problems.vector_field import returning
+
+#: A rate below this part of the terms it may consist of is zero: solutions are known to 1e-12, and their rates, too.
+_AT_REST = 1e-8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlgebraicProblem(Restated):
     """F(u, p) = 0, or the equilibria of u' = F(u, p).
+
+    Where u' = F(u, p) conserves totals of the states, `solve` makes each a parameter, ``total_`` + the name of a state that
+    follows from it, and is a column then. Its value is that of the guess, or is given among the parameters.
 
     Parameters
     ----------
@@ -38,7 +46,8 @@ class AlgebraicProblem(Restated):
     functionals : mapping of str to callable
         ``f(u, p)``: columns of every point.
     dynamics : bool
-        Whether u' = F(u, p): Hopf points are then looked for. Needs as many equations as states. For 200 states or more with a
+        Whether u' = F(u, p): Hopf points are then looked for, and conserved totals become parameters. Needs as many
+        equations as states. For 200 states or more with a
         sparse Jacobian, only the eigenvalues near the imaginary axis and right of it are computed.
     count : int, optional
         Number of equations of a residual that fills an array; as many as states by default.
@@ -133,6 +142,16 @@ class AlgebraicProblem(Restated):
         """Number of equations."""
         return max(self._shape, 1)
 
+    @functools.cached_property
+    def reduced(self) -> ReducedProblem | None:
+        """The same equilibria with conserved totals as parameters, without the states that follow; None where nothing is
+        conserved."""
+        totals = conservation_laws(self) if type(self) is AlgebraicProblem else ()
+        return ReducedProblem(self, totals) if len(totals) else None
+
+    def check_totals(self, u: Array, p: Array) -> None:
+        """Check that what was found to be conserved stays at states and parameters; here nothing was."""
+
     @property
     def free_size(self) -> int:
         """Number of free parameters on a curve: equations - states + 1."""
@@ -195,3 +214,124 @@ class AlgebraicProblem(Restated):
             matrix = matrix.copy()
             round_off.move(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         return matrix
+
+
+class ReducedProblem(AlgebraicProblem):
+    """The equilibria of a vector field without the states that follow from conserved totals, which are parameters.
+
+    Parameters
+    ----------
+    whole : AlgebraicProblem
+    totals : ndarray, shape (m, n)
+        The factors of the states in each total, in reduced echelon form: the first state that no other total contains, with the
+        factor 1, follows from it and the states that are kept.
+
+    Attributes
+    ----------
+    kept : list of int
+        Places of the states that are kept.
+    total_names, following : tuple of str
+        Names of the parameters, and of the states that follow.
+    """
+
+    whole: AlgebraicProblem
+    totals: Array
+    kept: list[int]
+    total_names: tuple[str, ...]
+    following: tuple[str, ...]
+    _follow: Array
+
+    def __init__(self, whole: AlgebraicProblem, totals: Any) -> None:
+        names, totals = whole.state_names, np.asarray(totals, dtype=float)
+        own = (totals != 0) & (np.count_nonzero(totals, axis=0) == 1) & (totals == 1)
+        pivots = [int(row.argmax()) for row in own]
+        kept = [i for i in range(len(names)) if i not in pivots]
+        taken = {*names, *whole.parameters, *whole.functionals}
+        total_names = tuple(_unused(f"total_{names[i]}", taken) for i in pivots)
+        follow = np.zeros((len(names), len(names)))  # the states, of those that are kept and the totals
+        follow[kept, np.arange(len(kept))] = 1.0
+        follow[pivots, : len(kept)], follow[pivots, len(kept) :] = -totals[:, kept], np.eye(len(totals))
+        following = tuple(names[i] for i in pivots)
+        self._keep(whole=whole, totals=totals, kept=kept, total_names=total_names, following=following, _follow=follow)
+        of_whole = functools.partial(_of_whole, names, follow.tolist(), total_names)
+        functionals = {name: of_whole(function) for name, function in whole.functionals.items()}
+        functionals |= {name: of_whole(_state(name)) for name in self.following}
+        rates, parameters = returning(whole.residual, whole._signature), dict.fromkeys(total_names, 0.0)
+        super().__init__(
+            of_whole(rates, kept), [names[i] for i in kept], {**whole.parameters, **parameters}, functionals,
+            jacobian=None if whole.jacobian is None else self._reduced_jacobian, angles=whole.angles,
+        )  # fmt: skip
+
+    def _reduced_jacobian(self, u: Any, p: Any) -> Any:
+        values = np.array(list(p))
+        known = len(self.whole.parameters)
+        matrix = self.whole.jacobian_at(self._states(np.array(list(u)), values[known:]), values[:known])
+        return matrix[self.kept] @ self._follow[:, : len(self.kept)]
+
+    def without_totals(self, states: Array) -> tuple[Array, dict[str, float]]:
+        """Return those of states (..., n) that are kept, and the totals, of several states in the mean."""
+        means = (states @ self.totals.T).reshape(-1, len(self.totals)).mean(axis=0)
+        return states[..., self.kept], dict(zip(self.total_names, map(float, means)))
+
+    def check_totals(self, u: Array, p: Array) -> None:
+        """Check that the states that follow are at rest, too: elsewhere a condition may have switched.
+
+        Raises
+        ------
+        ProblemError
+            One is not: its total is not conserved there.
+        """
+        known = len(self.whole.parameters)
+        states = self._states(u, p[known:])
+        system = self.whole.discretized((), dict(zip(self.whole.parameters, map(float, p))))
+        rates, matrix = system.residual(states), system.jacobian(states)
+        noise = _AT_REST * np.abs(matrix) @ (1 + np.abs(states))
+        for total, state in zip(self.totals, self.following):
+            place = self.whole.state_names.index(state)
+            if not abs(rates[place]) <= noise[place]:
+                what = f"{written(total, self.whole.state_names)} is conserved elsewhere, and not at the solution"
+                raise ProblemError(f"residual: {what}, where the rate of {state} is {rates[place]:.6g}; give another guess")
+
+    def _states(self, u: Array, totals: Array) -> Array:
+        """Return all states."""
+        found: Array = self._follow @ np.append(u, totals)
+        return found
+
+    @property
+    def conserved(self) -> str:
+        """What is conserved: a sentence."""
+        texts = checks.listed(written(total, self.whole.state_names) for total in self.totals)
+        names, states = checks.listed(self.total_names), checks.listed(self.following)
+        if len(self.totals) == 1:
+            return f"{texts} is conserved: the parameter {names} is its value, and {states} follows from the other states"
+        return f"{texts} are conserved: the parameters {names} are their values, and {states} follow from the other states"
+
+
+def _unused(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken."""
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _state(name: str) -> Function:
+    return lambda u, p: getattr(u, name)
+
+
+def _of_whole(
+    names: Sequence[str], follow: Sequence[Sequence[float]], totals: Sequence[str], function: Function,
+    kept: Sequence[int] | None = None,
+) -> Function:  # fmt: skip
+    """Return a function of all states as one of the states that are kept and the totals; of several values those to keep."""
+    state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
+
+    def reduced(u: Any, p: Any) -> Any:
+        known = [*u, *(getattr(p, name) for name in totals)]
+        states = []
+        for row in follow:
+            terms = [value if factor == 1 else factor * value for factor, value in zip(row, known) if factor]
+            states.append(sum(terms[1:], terms[0]))
+        values = function(state(*states), p)
+        return values if kept is None else [values[i] for i in kept]
+
+    return reduced

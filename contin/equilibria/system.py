@@ -78,6 +78,10 @@ class Algebraic(AlgebraicEquations):
         """Return which equations are dependent."""
         return dependence(self, x)
 
+    def check_solution(self, x: Array) -> None:
+        """Check that totals which were found to be conserved are so at a solution, too."""
+        self.problem.check_totals(self.states(x)[0], self.all_parameters(x))
+
     @property
     def curves(self) -> Mapping[str, type]:
         """That of Hopf points."""

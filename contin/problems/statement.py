@@ -75,8 +75,20 @@ class Restated:
     dynamics = False
     #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
     spare: str | None = None
+    #: The problem with conserved totals as parameters; None where nothing is conserved.
+    reduced: Any = None
     #: Of problems that are put together from segments: their parts.
     pieces: tuple[Any, ...] = ()
+
+    @property
+    def conserved(self) -> str:
+        """What is conserved, a sentence; "" where nothing is, or states that follow are still there."""
+        return ""
+
+    @property
+    def on_totals(self) -> Any:
+        """`reduced`, or the problem itself where nothing is conserved."""
+        return self.reduced or self
 
     @property
     def dimension(self) -> int:

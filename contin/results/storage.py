@@ -170,10 +170,13 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     """
 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
-        own = _statement(problem)
+        stated, own = problem, _statement(problem)
+        if head["states"] != own["states"]:  # without states that follow from totals
+            stated = problem.on_totals
+            own = _statement(stated)
         if any(head[name] not in (own[name], _UNTOLD) for name in own):
             raise ProblemError(f"{str(path)!r} is of another problem: {_said(head)}, not {_said(own)}")
-        systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
+        systems = [_system(stated, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
         return Branch(points, Stop(*head["stop"]) if head["stop"] else None, head["notes"])
 

@@ -79,8 +79,11 @@ def cycle(
     6.663287
     """
     checks.number("settle", settle, 0)
-    values = {**problem.parameters, **(parameters or {})}
-    first = _numbers(start, len(problem.state_names))
+    first, values = _numbers(start, len(problem.state_names)), dict(parameters or {})
+    if problem.reduced is not None:
+        first, totals = problem.reduced.without_totals(first)
+        problem, values = problem.on_totals, {**totals, **values}
+    values = {**problem.parameters, **values}
     field = _vector_field(problem, values)
     if problem.period is None:
         settled = _integrated(field, first, settle, _SETTLES).y[:, -1]

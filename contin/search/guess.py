@@ -39,6 +39,47 @@ class Options:
     degree: int
 
 
+def on_totals(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+    """Return a problem without the states that follow from conserved totals, the guess, and the parameters with totals of it.
+
+    Raises
+    ------
+    ProblemError
+        The totals are neither in the guess nor among the parameters.
+    """
+    reduced = problem.reduced
+    if reduced is None:
+        return problem, guess, parameters
+    found, count, kept_of = problem.on_totals, len(problem.state_names), reduced.without_totals
+    if isinstance(guess, Point):
+        if tuple(guess.system.problem.states) == found.state_names:
+            return found, guess, parameters
+        guess = _of_point(guess)
+    given = all(name in parameters for name in reduced.total_names)
+    if guess is None and not given:
+        raise ProblemError(f"guess: must be given, or the totals among the parameters, since {reduced.conserved}")
+    totals: dict[str, float] = {}
+    if callable(guess):
+        whole = guess
+        totals = kept_of(_sampled(whole, np.array(problem.domain[:1]), count))[1]
+        guess = lambda t: kept_of(_sampled(whole, np.array([t]), count)[0])[0]  # noqa: E731
+    elif _is_pair(guess):
+        states, totals = kept_of(_sampled(guess, _numbers(guess[0]), count))
+        guess = guess[0], states
+    elif guess is not None and not (given and _numbers(guess).size == len(found.state_names)):
+        guess, totals = kept_of(_numbers(guess, count))
+    return found, guess, {**totals, **parameters}
+
+
+def _of_point(point: Point) -> Guess:
+    """Return the states of a point, as a function of t where they are one."""
+    system: Any = point.system
+    if not system.is_function_of_t:
+        states: Array = system.states(point.x)[0]
+        return states
+    return lambda t: system.evaluate(point.x, np.array([t * system.order]))[0]
+
+
 def first_guess(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, options: Options) -> tuple[System, Array]:
     """Return the discretized problem and a vector of unknowns for a guess.
 

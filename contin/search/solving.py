@@ -23,7 +23,7 @@ from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
 from contin.search.deflation import correct_away
-from contin.search.guess import Guess, Options, first_guess
+from contin.search.guess import Guess, Options, first_guess, on_totals
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -77,16 +77,16 @@ def solve(
     """
     control = MeshControl() if mesh is None else mesh
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
-    _check_others(problem, others)
     forget_changed(problem)
-    parameters, free = _checked(parameters), with_multipliers(problem, free)
+    problem, guess, parameters = on_totals(problem, guess, _checked(parameters))
+    _check_others(problem, others)
+    free = with_multipliers(problem, free)
     if isinstance(guess, Point):
         guess = underlying(guess)
         read = winding_names(problem.angles)  # off the guess, as of all others
         parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
     held = _check_count(problem, free)
-    options = Options(parameters, free, intervals, _degree(problem, guess, control, degree))
-    system, x = first_guess(problem, guess, options)
+    system, x = first_guess(problem, guess, Options(parameters, free, intervals, _degree(problem, guess, control, degree)))
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others, held)
