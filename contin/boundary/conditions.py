@@ -9,7 +9,6 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.boundary.system import Collocation
-from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 
 
@@ -57,8 +56,9 @@ class Conditioned(Collocation):
         values, own = self.conditions_with_rows(x)
         if len(columns):
             own = np.concatenate([own, columns[:, self._conditions :].T], axis=1)
-        residual, blocks = self._blocks(x, np.concatenate([own, rows]), np.ascontiguousarray(columns[:, : self._conditions]))
-        return np.concatenate([residual, values]), Factorization(self._layout, blocks)
+        inside = np.ascontiguousarray(columns[:, : self._conditions])
+        residual, factors = self._linearized(x, np.concatenate([own, rows]), inside)
+        return np.concatenate([residual, values]), factors
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""

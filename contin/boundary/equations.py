@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from contin.collocation.assembly import Bordering, assemble, collocate
 from contin.collocation.defect import Defect
 from contin.collocation.workspace import Workspace, workspace
 from contin.functions.batch import Batch, Columns
+from contin.linalg.components import Around, Component, ComponentFactors, Part, components
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
@@ -45,12 +46,9 @@ class BoundaryEquations(OnMesh):
 
     @functools.cached_property
     def _columns(self) -> tuple[Columns, Columns]:
-        return self._columns_for(self._free)
-
-    def _columns_for(self, parameters: Indices) -> tuple[Columns, Columns]:
-        """Columns of field, by states in the layout's order, and of boundary; each by these parameters, too."""
+        """Columns of field, by states in the layout's order, and of boundary; each by the free parameters, too."""
         field, boundary = self.problem.batch("field"), self.problem.batch("boundary")
-        return field.columns(parameters, self._layout.order), boundary.columns(parameters)
+        return field.columns(self._free, self._layout.order), boundary.columns(self._free)
 
     @functools.cached_property
     def _field(self) -> Batch:
@@ -100,26 +98,80 @@ class BoundaryEquations(OnMesh):
         """Return the residual of the discrete equations at x, shape (equations,)."""
         return self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
 
-    def _blocks(
-        self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
-    ) -> tuple[Array, Blocks]:
-        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
-        of_field, of_boundary = self._columns
-        field, jacobian = self._field.jacobian(*self._inside(x), of_field)
-        boundary, ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)
-        blocks = self._empty_blocks(len(rows), len(columns), new)
+    def _linearized(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Factors]:
+        """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
+        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self._columns[1])
+        if self._components:
+            field, factors = self._factored_apart(x, ends[0], Bordering(columns, rows))
+            return self._residual(x, field, boundary), factors
+        field, jacobian = self._field.jacobian(*self._inside(x), self._columns[0])
+        blocks = self._empty_blocks(len(rows), len(columns))
         given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
         run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
-        return self._residual(x, field, boundary), blocks
+        return self._residual(x, field, boundary), Factorization(self._layout, blocks)
 
-    def _empty_blocks(self, rows: int, columns: int, new: Callable[[tuple[int, ...]], Array] = np.empty) -> Blocks:
+    def _empty_blocks(self, rows: int, columns: int) -> Blocks:
         """Return blocks for so many rows and columns around F_x."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free) + columns
         r, conditions, width = rows + problem.integral_size, problem.boundary_size, n * (d + 1) + k
         return Blocks(
-            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k)),
+            np.empty((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k)),
             np.empty((conditions, n)), np.empty((conditions, n + k)),
         )  # fmt: skip
+
+    @functools.cached_property
+    def _components(self) -> list[Component]:
+        """Parts of the states that meet at the ends only, where they are eliminated one by one; none where all are together."""
+        if self._n < _APART:
+            return []
+        found = components(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
+        return found if len(found) > 1 else []
+
+    @property
+    def separate_states(self) -> list[Indices]:
+        """The states in parts that meet at the ends only, as far as they are eliminated one by one."""
+        return [component.states for component in self._components] or [np.arange(self._n)]
+
+    def _factored_apart(self, x: Array, at_ends: Array, around: Bordering) -> tuple[Array, Factors]:
+        """Return the values of right-hand side and integrands, and the same matrix factored component by component.
+
+        ``at_ends`` (n_bc, 2 n + k) are the derivatives of the boundary conditions.
+        """
+        n, (columns, rows) = self._n, around
+        inside, of_field = self._inner, self.problem.batch("field").columns(self._free)
+        field, entries = self._field.entries(*self._inside(x), of_field)
+        points = columns[:, :inside].reshape(len(columns), self.gauss_times.size, n)
+        parts = [self._part(component, of_field, entries, points) for component in self._components]
+        integrals = np.empty((self.problem.integral_size, self.size))
+        for q, row in enumerate(integrals):
+            slopes, own = np.zeros((self.gauss_times.size, of_field.width)), of_field.rows == n + q
+            slopes[:, of_field.places[own]] = entries[:, own]
+            row[:] = self._to_nodes(self.gauss_weights[:, None] * slopes)
+        corner = np.concatenate([at_ends[:, 2 * n :], integrals[:, self.state_size :]])
+        corner = np.vstack([np.hstack([corner, columns[:, inside:].T]), rows[:, self.state_size :]])
+        states = np.concatenate([integrals[:, : self.state_size], rows[:, : self.state_size]])
+        return field, ComponentFactors(parts, Around(at_ends[:, :n], at_ends[:, n : 2 * n], states, corner))
+
+    def _part(self, component: Component, of_field: Columns, entries: Array, columns: Array) -> Part:
+        """Return the rows of a component from the ``entries`` of the Jacobian, and ``columns`` (c, points, n) besides."""
+        n, states, points, k = self._n, component.states, self.gauss_times.size, len(self.free)
+        count, at = len(states), np.full(n + self.problem.integral_size, -1)
+        at[states] = np.arange(count)
+        column = np.argsort(component.layout.order)
+        row, place = at[of_field.rows], of_field.places
+        own, other = (row >= 0) & (place < n), (row >= 0) & (place >= n)
+        jacobian = np.zeros((points, count, count))
+        jacobian[:, row[own], column[at[place[own]]]] = entries[:, own]
+        places, number = np.unique(place[other] - n, return_inverse=True)
+        slopes = np.zeros((points, count, len(places) + len(columns)))
+        slopes[:, row[other], number] = -self._h_points * entries[:, other]
+        slopes[:, :, len(places) :] = columns[:, :, states].transpose(1, 2, 0)
+        local, none = np.empty((self.intervals, count * self._d, count * (self._d + 1))), np.empty((0, 0))
+        border, ends = np.empty((self.intervals, 0, local.shape[2])), np.empty((0, count))
+        around = Bordering(np.empty((0, points * count)), np.empty((0, (points + 1) * count)))
+        given = component.layout, self.tables, self._h, jacobian, np.empty((1, 0, 2 * count)), around
+        assemble(*given, Blocks(local, border, none, ends, ends), share(self.intervals, 0))
+        return Part(component, local, slopes.reshape(points * count, -1), np.append(places, k + np.arange(len(columns))))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -131,34 +183,40 @@ class BoundaryEquations(OnMesh):
         """
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        residual, blocks = self._blocks(x, rows, columns)
-        return residual, Factorization(self._layout, blocks)
+        return self._linearized(x, rows, columns)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
-        n, (of_field, of_boundary) = self._n, self._columns_for(self._indices(names))
-        field = self._field.jacobian(*self._inside(x), of_field)[1][:, :, n:]
-        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0, :, 2 * n :]
+        n, which = self._n, self._indices(names)
+        of_field, of_boundary = (self.problem.batch(name).columns(which, ()) for name in ("field", "boundary"))
+        field = self._field.jacobian(*self._inside(x), of_field)[1]
+        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
         return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])])
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,), for w (equations,)."""
-        n, nothing = self._n, (np.empty((0, self.size)), np.empty((0, self.equations)))
-        _, (local, border, corner, first, last) = self._blocks(x, *nothing, np.zeros)
-        layout, collocation = self._layout, self.intervals * self._d * n
-        conditions, inner = collocation + len(first), n * (self._d - 1)
-        by_interval = w[:collocation].reshape(self.intervals, -1)[:, layout.rows]
-        inside = np.einsum("jr,jrc->jc", by_interval, local)
-        inside[:, : inner + 2 * n] += np.einsum("q,jqc->jc", w[conditions:], border[:, :, : inner + 2 * n])
-        result = np.zeros(self.size)
-        at = self._d * n * np.arange(self.intervals)[:, None]
-        np.add.at(result, at + layout.inside, inside[:, :inner])
-        np.add.at(result, at + layout.ends, inside[:, inner : inner + 2 * n])
-        result[:n] += first.T @ w[collocation:conditions]
-        result[self.state_size - n :] += last.T @ w[collocation:conditions]
-        result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
+        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
+        entries, slopes = self._field.entries(*self._inside(x), of_field)[1], np.zeros((of_field.width, self.gauss_times.size))
+        np.add.at(slopes, of_field.places, (self._at_points(w)[:, of_field.rows] * entries).T)
+        ends = w[self._inner : self._inner + self.problem.boundary_size]
+        result = self._to_nodes(slopes.T, ends @ self._boundary.jacobian(*self._at_ends(x), of_ends)[1][0])
+        rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
+        np.add.at(result[: self.state_size].reshape(-1, self._n), self._by_interval, rates)
         return result
+
+    @property
+    def _inner(self) -> int:
+        """Number of collocation conditions."""
+        return self.gauss_times.size * self._n
+
+    def _at_points(self, w: Array) -> Array:
+        """Return the weights of right-hand side and integrands at the Gauss points in w.F, shape (N d, n + n_int)."""
+        n = self._n
+        weights = np.empty((self.gauss_times.size, n + self.problem.integral_size))
+        weights[:, :n] = -self._h_points * w[: self._inner].reshape(-1, n)
+        weights[:, n:] = self.gauss_weights[:, None] * w[self._inner + self.problem.boundary_size : self._conditions]
+        return weights
 
     def _row_sizes(self, x: Array) -> dict[str, Array]:
         """Return the largest entries of the rows of boundary and integral conditions."""
@@ -178,27 +236,26 @@ class BoundaryEquations(OnMesh):
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
-        n, inner = self._n, self.gauss_times.size * self._n
-        conditions = inner + self.problem.boundary_size
-        weights = np.empty((self.gauss_times.size, n + self.problem.integral_size))
-        weights[:, :n] = -self._h_points * w[:inner].reshape(-1, n)
-        weights[:, n:] = self.gauss_weights[:, None] * w[conditions : self._conditions]
         of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
-        inside = self._wide(v, self.at_gauss_points(v))
-        result = self._to_nodes(self._field.bent(*self._inside(x), weights, inside, of_field))
-        ends = self._wide(v, self._both_ends(v))
-        at_ends = self._boundary.bent(*self._at_ends(x), w[None, inner:conditions], ends, of_ends)[0]
-        result[:n] += at_ends[:n]
-        result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
-        result[self.state_size :] += at_ends[2 * n :]
-        return result
+        inside, both = self._wide(v, self.at_gauss_points(v)), self._wide(v, self._both_ends(v))
+        ends = w[None, self._inner : self._inner + self.problem.boundary_size]
+        slopes = self._field.bent(*self._inside(x), self._at_points(w), inside, of_field)
+        return self._to_nodes(slopes, self._boundary.bent(*self._at_ends(x), ends, both, of_ends)[0])
 
-    def _to_nodes(self, slopes: Array) -> Array:
-        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
-        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        by_node = np.zeros((self.nodes.size, self._n))
+    def _to_nodes(self, slopes: Array, at_ends: Array | None = None) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k).
+
+        ``at_ends`` (2 n + k,) are further ones by the states at both ends and the free parameters.
+        """
+        n, by_points = self._n, slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        by_node = np.zeros((self.nodes.size, n))
         np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
-        return np.append(by_node.ravel(), slopes[:, self._n :].sum(axis=0))
+        result = np.append(by_node.ravel(), slopes[:, n:].sum(axis=0))
+        if at_ends is not None:
+            result[:n] += at_ends[:n]
+            result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
+            result[self.state_size :] += at_ends[2 * n :]
+        return result
 
     # --- functionals ---------------------------------------------------------------------------------------------
 
@@ -283,7 +340,7 @@ class BoundaryEquations(OnMesh):
 
     def _made_workspace(self) -> Workspace | None:
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
-        if own is None or not recorded or not 0 <= self.size - self.equations <= 1:
+        if own is None or not recorded or self._components or not 0 <= self.size - self.equations <= 1:
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
@@ -296,6 +353,9 @@ class BoundaryEquations(OnMesh):
         return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0))
 
 
+#: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
+#: than by one kernel, three the same, ten a twentieth of the time.
+_APART = 30
 #: The t of boundary conditions, which do not take it.
 _TIME = np.zeros(1)
 

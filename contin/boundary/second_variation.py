@@ -22,13 +22,13 @@ intervals are joined in the same way, as long as that holds. What is left is a s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Indices
 from contin.boundary.system import Collocation
 from contin.collocation.basis import interpolation
 from contin.core.labels import Label
@@ -64,7 +64,7 @@ class SecondVariation:
 
     eigenvalues: Array
     _vectors: Array
-    _profile: _Profile
+    _parts: tuple[_Part, ...]
 
     def __repr__(self) -> str:
         return f"SecondVariation({len(self.eigenvalues)} eigenvalues, {self.index()} of them negative)"
@@ -80,18 +80,26 @@ class SecondVariation:
         The largest number of each is 1. Basis and signs follow from the space (`contin.linalg.orientation.canonical_basis`).
         """
         order = np.argsort(np.abs(self.eigenvalues))[:count]
-        modes = np.array([self._profile.at(self._vectors[:, j], np.asarray(t, dtype=float)) for j in order])
+        modes = np.array([self._at(self._vectors[:, j], np.asarray(t, dtype=float)) for j in order])
         if len(modes):
             modes = canonical_basis(modes.reshape(len(modes), -1)).reshape(modes.shape)
         largest = np.abs(modes).max(axis=(1, 2), keepdims=True, initial=0.0)
         result: Array = modes / np.where(largest > 0, largest, 1.0)
         return result
 
+    def _at(self, unknowns: Array, t: Array) -> Array:
+        """Return dx at t (K,), shape (K, n), from the reduced unknowns."""
+        found = np.empty((len(t), sum(len(part.states) for part in self._parts)))
+        for part in self._parts:
+            found[:, part.states], unknowns = part.profile.at(unknowns[: part.size], t), unknowns[part.size :]
+        return found
+
     def broken(self, count: int, symmetries: Mapping[str, Symmetry]) -> tuple[str, ...]:
         """Return the names of those symmetries that the ``count`` modes nearest to zero break."""
         if not symmetries:
             return ()
-        t = np.linspace(self._profile.mesh[0], self._profile.mesh[-1], _PLACES)
+        mesh = self._parts[0].profile.mesh
+        t = np.linspace(mesh[0], mesh[-1], _PLACES)
         modes = self.modes(count, t)
         return tuple(
             name for name, image in symmetries.items()
@@ -129,8 +137,9 @@ def legendre() -> Event:
     def margin(trial: Trial) -> float:
         system: Any = trial.system
         if system.problem.legendre is None:
-            n = system.problem.dimension
-            value = _convexity(_jacobian(system, trial.x)[:, :n, n:])
+            n, jacobian = system.problem.dimension, _jacobian(system, trial.x)
+            parts = (states[states < n] for states in system.separate_states)
+            value = min(_convexity(jacobian[:, own[:, None], n + own]) for own in parts)
         else:
             points = system.states_at_gauss_points(trial.x)
             value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
@@ -237,6 +246,15 @@ class _Profile(NamedTuple):
         return result
 
 
+class _Part(NamedTuple):
+    """States that depend on each other, by number, what is left of their intervals, and the number of unknowns of these."""
+
+    states: Indices
+    pieces: _Pieces
+    profile: _Profile
+    size: int
+
+
 def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
     """Return the second variation at a solution x of a variational problem; None where Legendre's condition fails.
 
@@ -245,20 +263,41 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
     ProblemError
         End conditions that repeat or contradict each other there.
     """
-    local = _intervals(system, x)
-    if local is None:
-        return None
-    pieces, inside = local
+    n, parts = system.problem.dimension, []
+    jacobian = _jacobian(system, x)
+    for states in system.separate_states:
+        own, rest = states[states < n], np.arange(2 * n, jacobian.shape[1])
+        both = np.concatenate([own, n + own])
+        local = _intervals(system, jacobian[:, np.append(both, rest)][:, :, both])
+        if local is None:
+            return None
+        parts.append(_part(system, own, *local))
+    values, vectors = _reduced(system, x, parts)
+    return SecondVariation(values, vectors, tuple(parts))
+
+
+def _part(system: Collocation, states: Indices, pieces: _Pieces, inside: Array) -> _Part:
+    """Return what is left of the intervals of states that depend on each other."""
     pieces, recoveries = _joined(pieces)
-    values, vectors, starts = _reduced(system, x, pieces)
-    return SecondVariation(values, vectors, _Profile(system.mesh, system.basis.points, inside, recoveries, starts))
+    count, n, m = pieces.b.shape
+    at = np.zeros((n, n + count * m))
+    at[:, :n] = np.eye(n)
+    starts = [at]
+    for i in range(count):
+        at = pieces.phi[i] @ at
+        at[:, n + i * m : n + (i + 1) * m] += pieces.b[i]
+        starts.append(at)
+    profile = _Profile(system.mesh, system.basis.points, inside, recoveries, np.array(starts))
+    return _Part(states, pieces, profile, at.shape[1])
 
 
-def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
-    """Return the single intervals, with all components of v, and dx at their Gauss points, shape (N, d, n, n + d k)."""
-    n = system.problem.dimension
-    h, d = np.diff(system.mesh), system.degree
-    jacobian = _jacobian(system, x).reshape(len(h), d, -1, 2 * n)
+def _intervals(system: Collocation, jacobian: Array) -> tuple[_Pieces, Array] | None:
+    """Return the single intervals, with all components of v, and dx at their Gauss points, shape (N, d, n, n + d k).
+
+    ``jacobian`` (N d, 2 n + n_int, 2 n) are the derivatives of the rates of (x, lambda) and of the integrands.
+    """
+    n, h, d = jacobian.shape[2] // 2, np.diff(system.mesh), system.degree
+    jacobian = jacobian.reshape(len(h), d, -1, 2 * n)
     a, hll, hxx = jacobian[:, :, :n, :n], jacobian[:, :, :n, n:], -jacobian[:, :, n : 2 * n, :n]
     roots = _roots((hll + hll.swapaxes(2, 3)) / 2)
     if roots is None:
@@ -377,26 +416,21 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
     return turned, _Recovery(turn, rest, len(turn))
 
 
-def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Array, Array]:
-    """Return eigenvalues and eigenvectors of Q over (x of the first end, all y), restricted to what the conditions allow.
-
-    And x at the beginning of each piece, and at the end, from these: (K + 1, n, size).
-    """
-    count, n, m = pieces.b.shape
-    size = n + count * m
-    at = np.zeros((n, size))
-    at[:, :n] = np.eye(n)
-    starts, q, held = [at], np.zeros((size, size)), np.zeros((pieces.g.shape[1], size))
-    for i in range(count):
-        own = np.zeros((n + m, size))
-        own[:n] = at
-        own[n:, n + i * m : n + (i + 1) * m] = np.eye(m)
-        q += own.T @ pieces.q[i] @ own
-        held += pieces.g[i] @ own
-        at = pieces.phi[i] @ at + pieces.b[i] @ own[n:]
-        starts.append(at)
+def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Array, Array]:
+    """Return eigenvalues and eigenvectors of Q over (x of the first end, all y) of each part, with the conditions held."""
     ends, second = _ends(system, x)
-    both = np.vstack([starts[0], at])
+    n, size = system.problem.dimension, sum(part.size for part in parts)
+    q, both, held, begin = np.zeros((size, size)), np.zeros((2 * n, size)), np.zeros((parts[0].pieces.g.shape[1], size)), 0
+    for states, pieces, profile, count in parts:
+        own, each, m = slice(begin, begin + count), len(states), pieces.b.shape[2]
+        for i in range(len(pieces.b)):
+            at = np.zeros((each + m, count))
+            at[:each] = profile.starts[i]
+            at[each:, each + i * m : each + (i + 1) * m] = np.eye(m)
+            q[own, own] += at.T @ pieces.q[i] @ at
+            held[:, own] += pieces.g[i] @ at
+        both[states, own], both[n + states, own] = profile.starts[0], profile.starts[-1]
+        begin += count
     q += both.T @ second @ both
     rows = np.vstack([ends @ both, held])
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
@@ -409,7 +443,7 @@ def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Arr
             )
         free = vectors[len(rows) :].T
     values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)
-    return values, free @ modes, np.array(starts)
+    return values, free @ modes
 
 
 def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:

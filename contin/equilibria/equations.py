@@ -122,7 +122,7 @@ class AlgebraicEquations(System):
         from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
 
         residual, entries = self._residual.entries(*given, columns)
-        return residual, csr_array((entries, (columns.rows, columns.places)), shape=(self.equations, self.size))
+        return residual[0], csr_array((entries[0], (columns.rows, columns.places)), shape=(self.equations, self.size))
 
     def _given_jacobian(self, x: Array, given: Any) -> tuple[Array, Any]:
         """Return the same with the derivatives by states from the user's function."""
@@ -172,7 +172,7 @@ class AlgebraicEquations(System):
         columns_of = batch.columns(which)
         if self.is_sparse:
             rows, places = columns_of.rows, columns_of.places
-            entries = batch.entries(_NO_TIME, u, self._none, p, columns_of)[1]
+            entries = batch.entries(_NO_TIME, u, self._none, p, columns_of)[1][0]
             columns = np.zeros((self.equations, len(which)))
             columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
             return columns

@@ -168,9 +168,9 @@ class Batch:
         return self._own.evaluate(columns.request, t, u, v, p)
 
     def entries(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
-        """Return the values at one point, shape (count,), and the entries of the Jacobian in the order of `Columns`."""
+        """Return values (points, count), and the entries of the Jacobian (points, entries) in the order of `Columns`."""
         values, entries = self._own.evaluate(columns.packed, t, u, v, p)
-        return values[0], entries[0, 0]
+        return values, entries[:, 0]
 
     def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
         """Return the columns of derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""

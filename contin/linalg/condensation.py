@@ -75,20 +75,23 @@ class Factorization:
         self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
 
     @classmethod
-    def unfilled(cls, layout: Layout, blocks: Blocks) -> Factorization:
-        """Return one of this shape, with ``room`` in which a kernel factors a matrix; it then sets the ``sign``."""
+    def unfilled(cls, layout: Layout, blocks: Blocks, whole: Share | None = None) -> Factorization:
+        """Return one of this shape, with ``room`` in which a kernel factors a matrix; it then sets the ``sign``.
+
+        ``whole`` are its segments, by default as many as suit its size.
+        """
         found = cls.__new__(cls)
-        found._take(layout, blocks)
+        found._take(layout, blocks, whole)
         return found
 
-    def _take(self, layout: Layout, blocks: Blocks) -> None:
+    def _take(self, layout: Layout, blocks: Blocks, whole: Share | None = None) -> None:
         local, border, corner, first, last = blocks
         intervals, rows, _ = local.shape
         (r, k), (conditions, n) = corner.shape, first.shape
         size = 2 * n + k
         if n + conditions + r != size:
             raise ValueError(f"{conditions} boundary conditions and {r} border rows for {n} states and {k} parameters")
-        self._layout, self._whole = layout, share(intervals, local.size)
+        self._layout, self._whole = layout, whole or share(intervals, local.size)
         eliminated = Eliminated(
             local, border, np.empty((max(intervals - 1, 0), 2 * n + r, n + size)), np.empty((size, size)),
             np.empty((intervals, rows), np.int64), np.empty(size, np.int64),

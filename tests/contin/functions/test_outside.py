@@ -108,7 +108,7 @@ def test_a_sparse_matrix_has_its_pattern():
     batch = Batch([lambda u, p: MATRIX @ u + 0 * u**2], [4], list("abcd"), [], times=False)
     columns = batch.columns([])
     given = np.zeros(1), np.arange(4.0)[None], np.empty((0, 4)), np.empty(0)
-    entries = batch.entries(*given, columns)[1]
+    entries = batch.entries(*given, columns)[1][0]
     found = scipy.sparse.coo_array((entries, (columns.rows, columns.places)), shape=(4, 4))
     assert columns.rows.size == 10 and np.allclose(found.toarray(), MATRIX.toarray(), rtol=1e-15, atol=0)
 
