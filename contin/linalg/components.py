@@ -10,9 +10,9 @@ condensation leaves of C between both ends::
     [   N (ends)   -I                 ] = [ 0 ]       x = y + W z,   z = (beta of all components, parameters)
     [   rows              corner      ]   [ c ]
 
-K = [C; N] is as well conditioned as the differential equation allows: it fixes what R leaves open at the ends, and no more. Then
-y = K^-1 [b; 0], W has the columns K^-1 [0; I] and -K^-1 [P; 0], and (rows W + corner) z = c - rows y is a dense system with as
-many unknowns as there are states and parameters. Rows are boundary conditions, integral conditions and those that border F_x.
+K = [C; N] is as well conditioned as the differential equation allows: it fixes what R leaves open at the ends, and no more.
+Then y = K^-1 [b; 0], W has the columns K^-1 [0; I] and -K^-1 [P; 0], and (rows W + corner) z = c - rows y is a dense system
+with as many unknowns as there are states and parameters. Rows are boundary and integral conditions, and those around F_x.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def components(depends: Pattern, degree: int) -> list[Component]:
 class Part(NamedTuple):
     """The rows of one component.
 
-    ``local`` (N, n d, n (d + 1)) are its `Blocks`, which are overwritten; ``slopes`` (n d N, q) those by the unknowns behind the
-    states whose numbers are ``places`` (q,).
+    ``local`` (N, n d, n (d + 1)) are its `Blocks`, which are overwritten; ``slopes`` (n d N, q) those by the unknowns behind
+    the states whose numbers are ``places`` (q,).
     """
 
     component: Component
@@ -69,8 +69,8 @@ class Part(NamedTuple):
 class Around(NamedTuple):
     """All other rows: r of them, for n states and k unknowns behind those.
 
-    ``first`` and ``last`` (b, n) belong to the first b rows, by the first and the last mesh point; ``rows`` (r - b, states at all
-    nodes) to the others; ``corner`` (r, k) to all.
+    ``first`` and ``last`` (b, n) belong to the first b rows, by the first and the last mesh point; ``rows`` (r - b, states at
+    all nodes) to the others; ``corner`` (r, k) to all.
     """
 
     first: Array
@@ -97,7 +97,7 @@ class ComponentFactors:
     """
 
     def __init__(self, parts: Sequence[Part], around: Around) -> None:
-        (conditions, n), (count, k) = around.first.shape, around.corner.shape
+        n, (count, k) = around.first.shape[1], around.corner.shape
         if n + k != count:
             raise ValueError(f"{count} rows for {n} states and {k} parameters")
         self._n, self._k, self._around = n, k, around
