@@ -73,8 +73,9 @@ def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict
     for branch, path in zip(branches, files):
         families.setdefault(branch["family"], []).append(branch | {"path": str(path)})
     _leave_out(families)
+    axes = [axis for axis in branches[0]["axes"] if all(axis in branch["axes"] for branch in branches)]  # of all versions
     return {
-        "title": title, "kind": "strips", "axes": branches[0]["axes"], "shown": ["kappa_n", "kappa_star"],
+        "title": title, "kind": "strips", "axes": axes, "shown": ["kappa_n", "kappa_star"],
         "families": [strips.family_of(families[material]) for material in sorted(families)],
     }  # fmt: skip
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -195,6 +195,10 @@ class Columns:
             found[f"error_{one.name}"] = "f8", f"estimated error of {one.name}", one.error
         watch = _INDEX if self.watched else ()
         return found | {one.name: (one.kind, one.words, one.of) for one in watch if events or not one.of_labelled}
+
+    def among(self, names: Collection[str]) -> Columns:
+        """Return those that a table with these names has, and those that follow from others."""
+        return replace(self, values=tuple(one for one in self.values if one.derived or one.name in names))
 
     def shown(self) -> list[str]:
         """Return the names of numbers and of what was found, which maps and graphs show."""

@@ -104,8 +104,8 @@ class StoredBranch(ABC):
 
     @functools.cached_property
     def columns(self) -> Columns:
-        """The columns of the scene; a file of another version may lack some."""
-        return self.stages[0].columns()
+        """The columns of the scene that the file has: one of another version may lack some."""
+        return self.stages[0].columns().among(self.points.dtype.names)
 
     @property
     def about(self) -> str:

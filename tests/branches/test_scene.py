@@ -37,8 +37,9 @@ def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
                        value=lambda row: 2 * row.values["energy"])  # fmt: skip
         return dataclasses.replace(found, values=(*found.values, twice))
 
-    monkeypatch.setattr(ClosedStage, "columns", columns)
     scene = parse(f"m: 1\nn: 2\n{COARSE}", "scene")
+    run_scene(scene, tmp_path / "older.h5", Display(silent=True))
+    monkeypatch.setattr(ClosedStage, "columns", columns)
     assert run_scene(scene, tmp_path / "x.h5", Display(silent=True)) == "complete"
     branch = read_branch(tmp_path / "x.h5")
     assert np.array_equal(branch.points["twice"], 2 * branch.points["energy"])
@@ -56,6 +57,10 @@ def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
     assert "twice" in page["families"][0]["branches"][0]["columns"]
     (axes,) = branch.plot(shapes=0, x="kappa_n", y="twice").axes
     assert axes.get_ylabel() == "twice the energy"
+    older = kind.part(read_branch(tmp_path / "older.h5"), "older.h5", {})  # a file of the version before, without it
+    kind.add(graph, older)
+    both = gather([str(tmp_path / "x.h5"), str(tmp_path / "older.h5")])
+    assert [name for name, *_ in both["axes"]] == [name for name, *_ in page["axes"] if name != "twice"]
 
 
 def test_a_column_that_follows_from_others_is_in_no_file(tmp_path):
