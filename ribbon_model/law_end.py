@@ -1,18 +1,26 @@
-"""Where the law of an open strip ends, so that a run ends there and says why."""
+"""Where a law ends, so that a run ends there and says why.
+
+The law of a strip that is given by its strain energy U ends where U is not convex at a strain along the strip. Beyond that,
+H = max(M.omega - U) has several values or none. A branch reaches the end smoothly, with strains that grow like a square root,
+or through a jump: two neighbouring places of the strip take different minima of U - M.omega.
+"""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin import Event
 from contin.lowlevel import Collocation, Continuation, Trial
-from ribbon_model.convexity import least_on_lines
 from ribbon_model.equilibrium import moment_on_directors, strains_of
-from ribbon_model.section import Section
+from ribbon_model.law import Law
+
+if TYPE_CHECKING:  # closed strips need no sections
+    from ribbon_model.section import Section
 
 Strains = Callable[[Collocation, np.ndarray], np.ndarray]
 
@@ -27,8 +35,52 @@ _ROUNDS = 3
 _PLACES = 17
 
 
+#: Parts of a line between strains at neighbouring nodes. U is concave on a tenth of a jump at least (measured on (3, 1)).
+_PARTS = 16
+#: The name of the end of a law on branches of closed strips.
+NAME = "the end of the convex strain energy"
+
+
+def _least_on_lines(margin: Callable[[np.ndarray, np.ndarray], np.ndarray], t: np.ndarray, strains: np.ndarray) -> float:
+    """Return the least ``margin(t, strains)`` at nodes (K,) and on straight lines between the strains of neighbouring ones.
+
+    At a jump, U is concave on the line. Without a response the margin is -1.
+    """
+    both = np.column_stack([t, strains])
+    lines = np.concatenate([both[:-1] + part * np.diff(both, axis=0) for part in np.arange(_PARTS) / _PARTS] + [both[-1:]])
+    return float(margin(lines[:, 0], lines[:, 1:]).min()) if np.all(np.isfinite(lines)) else -1.0
+
+
+# --- closed strips ------------------------------------------------------------------------------------------------------------
+
+
+def margin(law: Law) -> Callable[[Collocation, np.ndarray], float] | None:
+    """Return ``margin(system, x)``, the least `Law.margin` along a closed strip: 1 on planar circles, -1 without a response.
+
+    None for a law whose H is a closed expression, because its domain is known.
+    """
+    if not law.ends_with_convexity:
+        return None
+    from ribbon_model.solution import Solution  # 10 ms, which open strips do not need
+
+    def least(system: Collocation, x: np.ndarray) -> float:
+        solution = Solution.at(system, x)
+        return _least_on_lines(lambda _, w: law.margin(w, w, *solution.material), solution.t, solution.strains())
+
+    return least
+
+
+def closed_tests(law: Law) -> list[Event]:
+    """Return the test function that ends a run of a closed strip where the law ends; none if H is a closed expression."""
+    least = margin(law)
+    return [Event("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
+
+
+# --- open strips --------------------------------------------------------------------------------------------------------------
+
+
 def tests(section: Section, strains: Strains) -> list[Event]:
-    """Return the test function that ends a run where the law ends; none for a law that is regular everywhere.
+    """Return the test function that ends a run of an open strip where the law ends; none for a law that is regular everywhere.
 
     Parameters
     ----------
@@ -98,7 +150,7 @@ def _least_margin(section: Section, strains: Strains, trial: Trial) -> float:
 def _convexity(section: Section, strains: Strains, trial: Trial) -> float:
     """Return the least `Section.margin` at the strains of the nodes and on lines between these."""
     p, omega = _numbers(trial), strains(trial.system, trial.x)
-    return least_on_lines(lambda t, w: section.margin(t, w, w, p), trial.system.nodes, omega)
+    return _least_on_lines(lambda t, w: section.margin(t, w, w, p), trial.system.nodes, omega)
 
 
 def _numbers(trial: Trial) -> SimpleNamespace:

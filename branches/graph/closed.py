@@ -7,54 +7,36 @@ their columns. The command is ``python -m branches.graph DIR`` (`branches.graph`
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from branches.graph.interpolation import places
+from branches.graph.parts import Part, add, edges_of, special
 from branches.graph.stored import CLOSED_FORMAT, COLUMNS
 from branches.scene.closed import ClosedScene, law_of
-from branches.scene.labels import SPECIAL, kind_of
+from branches.scene.labels import kind_of
+from branches.store.branch import Piece
 from contin.lowlevel import exact_text
 from ribbon_model.linear import circle, covering
 
 #: The format of diagrams of closed strips, the title of one without, and whether there is an exact solution.
 FORMAT, TITLE, EXACT = CLOSED_FORMAT, "diagram", True
+#: The kinds of special points that a summary counts, in words.
+COUNTED = {
+    "circle": "bifurcations of circles", "fold": "folds", "leaves": "branches that end at the scene's own limits",
+}  # fmt: skip
 #: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
 _MEETINGS = ("secondary bifurcation", "primary branch")
 #: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
 _SAME = 1e-6
 
 
-@dataclass(frozen=True)
-class Course:
-    """A primary branch as a diagram holds it.
-
-    Attributes
-    ----------
-    family : dict
-        law, nu, m and n.
-    file, name : str
-        Its result, and the branch in words.
-    nodes : list of (str, dict)
-        Identifiers and attributes of its special points (see `node`), from end to end.
-    pieces : list of dict
-        The columns between consecutive special points, as lists.
-    """
-
-    family: dict
-    file: str
-    name: str
-    nodes: list[tuple[str, dict]]
-    pieces: list[dict]
-
-
-def part(branch, file: str, numbers: object = None) -> Course:
-    """Return the course of a primary branch from its file."""
-    family, special = _family(branch.scene), _special(branch)
-    nodes = [_node_of(event, family, branch) for event in special]
-    return Course(family, file, branch.scene.name, nodes, _pieces_of(branch, special))
+def part(branch, file: str, numbers: object = None) -> Part:
+    """Return the part of a diagram that the result of a primary branch is."""
+    family = _family(branch.scene)
+    nodes = [_node_of(event, family, branch) for event in special(branch)]
+    words = f"{branch.scene.name}: {describe([attributes for _, attributes in nodes])}"
+    return Part(nodes, _edges(branch, nodes, family, file), (words,))
 
 
 def add_branch(graph, branch, name: str) -> bool:
@@ -75,17 +57,12 @@ def add_branch(graph, branch, name: str) -> bool:
     """
     if not branch.config["origin"]:
         return add(graph, part(branch, name))
-    family, special = _family(branch.scene), _special(branch)
-    nodes = _nodes_of_secondary(graph, special, family, branch)
+    family = _family(branch.scene)
+    nodes = _nodes_of_secondary(graph, family, branch)
     start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
     if any(data.get("domain") == family["domain"] for _, _, data in start):
         return False
-    return connect(graph, family, nodes, _pieces_of(branch, special), file=name)
-
-
-def add(graph, course: Course) -> bool:
-    """Add a primary branch to the diagram; see `add_branch`."""
-    return connect(graph, course.family, course.nodes, course.pieces, file=course.file)
+    return add(graph, Part(nodes, _edges(branch, nodes, family, name)))
 
 
 def _family(scene: ClosedScene) -> dict:
@@ -96,27 +73,20 @@ def _family(scene: ClosedScene) -> dict:
     return family
 
 
-def _special(branch) -> list:
-    """Return the labelled points of a branch that are nodes of a diagram."""
-    return [event for event in branch.events if event["label"].decode() in SPECIAL]
+def _edges(branch, nodes: list[tuple[str, dict]], family: dict, file: str) -> list[tuple[str, str, dict]]:
+    """Return the pieces between consecutive special points."""
 
-
-def _pieces_of(branch, special: list) -> list[dict]:
-    """Return the columns between consecutive special points."""
-    found = []
-    for first, last in pairwise(special):
-        rows = branch.points[first["point"] : last["point"] + 1]
-        names = ("arclength", *branch.columns.mapped("kappa_n"))
-        piece = {column: rows[column].tolist() for column in names}
+    def about(piece: Piece) -> dict:
+        own, rows = family | {"file": file}, branch.points[piece.rows]
         if branch.config["origin"]:
-            piece["force"] = np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()
-        if "index" in rows.dtype.names:
-            piece["index"] = branch.index_on(np.arange(first["point"], last["point"] + 1))
-        found.append(piece)
-    return found
+            own |= {"force": np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()}
+        return own | ({"index": branch.index_on(piece.rows)} if "index" in rows.dtype.names else {})
+
+    names = {int(event["point"]): name for event, (name, _) in zip(special(branch), nodes)}
+    return edges_of(branch, names, branch.columns.mapped("kappa_n"), about)
 
 
-def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
+def _nodes_of_secondary(graph, family: dict, branch) -> list[tuple[str, dict]]:
     """Return the nodes of a secondary branch; nodes that the diagram already has are reused.
 
     Identifiers of new nodes give the origin in nine digits, or exactly if another branch has these identifiers.
@@ -124,7 +94,7 @@ def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str,
     origin = branch.config["origin"]
     exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
     for place in (f"{origin['kappa_n']:.9g}", exact):
-        own = [_node_of(event, family, branch, place) for event in special]
+        own = [_node_of(event, family, branch, place) for event in special(branch)]
         nodes = [_known(graph, node) or node for node in own]
         if not any(node is new and node[0] in graph for node, new in zip(nodes, own)):
             break
@@ -147,16 +117,6 @@ def same_place(a: dict, b: dict) -> bool:
     """Return whether two special points agree in quantities that rigid motions and the starting point do not change."""
     columns = [column for column in COLUMNS[1:] if column in a and column in b]
     return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
-
-
-def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
-    """Add a branch from its nodes (see `node`), from end to end, and the columns of the pieces between; see `add_branch`."""
-    if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
-        return False
-    graph.add_nodes_from(nodes)
-    for (a, _), (b, _), columns in zip(nodes, nodes[1:], pieces):
-        graph.add_edge(a, b, **family, **attributes, **columns)
-    return True
 
 
 def holds(graph, scene: ClosedScene) -> bool:
@@ -330,21 +290,6 @@ def folds(graph, low: float, high: float, law: str | None = None, nu: float | No
 
 
 # --- in words ------------------------------------------------------------------------------------------------------
-
-
-def lines(course: Course) -> list[str]:
-    """Return a branch and its special points in one line."""
-    return [f"{course.name}: {describe([attributes for _, attributes in course.nodes])}"]
-
-
-def counts(graph, title: str) -> tuple[str, str]:
-    """Return how many branches and special points a diagram has, in two lines."""
-    kinds = [kind for _, kind in graph.nodes(data="kind")]
-    return (
-        f"{title or TITLE}: {len(families(graph))} branches",
-        f"{kinds.count('circle')} bifurcations of circles, {kinds.count('fold')} folds, "
-        f"{kinds.count('leaves')} branches that end at the scene's own limits",
-    )
 
 
 def describe(nodes) -> str:

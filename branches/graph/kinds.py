@@ -1,13 +1,10 @@
 """How results of a kind of strip make a diagram.
 
 A kind is a module with the name of its ``FORMAT``, a ``TITLE`` for diagrams without one, ``EXACT`` if there are quadratures
-for a preview, and these functions:
+for a preview, the kinds of special points that are ``COUNTED``, and
 
-- ``part(branch, file, numbers)``: the part of a diagram that a result is; it can be sent to another process;
-- ``add(graph, part)``: add it to a diagram;
-- ``lines(part)``: the part in words;
-- ``holds(graph, scene)``: whether a diagram has the branch of a scene, from its other end;
-- ``counts(graph, title)``: how many branches and special points a diagram has, in two lines.
+- ``part(branch, file, numbers)``: the part of a diagram that a result is (`branches.graph.parts.Part`);
+- ``holds(graph, scene)``, for scenes with an ``other_end``: whether a diagram has the branch of a scene, from there.
 """
 
 from __future__ import annotations

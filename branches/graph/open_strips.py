@@ -8,34 +8,27 @@ and the ``factor`` that gives it its unit, the ``index`` along them (-1 where it
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
+from branches.graph.parts import Part, add, edges_of, special
 from branches.graph.stored import OPEN_FORMAT, new_graph
-from branches.scene.labels import SPECIAL, label_of, without_round_off
+from branches.scene.labels import label_of, without_round_off
+from branches.store.branch import Piece
 from branches.store.open_branch import OpenBranch
 from contin.lowlevel import exact_text
 
 #: The format of diagrams of open strips, the title of one without, and whether there is an exact solution.
 FORMAT, TITLE, EXACT = OPEN_FORMAT, "open strips", False
-
-
-@dataclass(frozen=True)
-class Part:
-    """A result as a diagram holds it: nodes with their attributes, edges with their ends and attributes; and its notes."""
-
-    nodes: dict[str, dict]
-    edges: list[tuple[str, str, dict]]
-    notes: tuple[str, ...]
+#: The kinds of special points that a summary counts, in words.
+COUNTED = {"fold": "folds", "branch point": "branch points"}
 
 
 def part(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
     """Return the part of a diagram that a result is."""
     names: dict[int, str] = {}
-    found, about = Part({}, [], branch.notes), {"file": file, "numbers": numbers}
-    for event in branch.events:
-        if event["label"].decode() not in SPECIAL:
-            continue
+    nodes, own = [], {"file": file, "numbers": numbers}
+    for event in special(branch):
         row, stage = int(event["point"]), int(event["stage"])
         begins = event["name"] == b"start"
         if begins and stage > 1:
@@ -43,47 +36,23 @@ def part(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
             continue
         kind = "start" if begins else label_of(event["label"].decode()).kind
         names[row] = f"{file}: stage {stage}, {kind} {row}"
-        columns = {name: float(event[name]) for name in branch.columns.shown()}
+        columns = {name: float(event[name]) for name in ("arclength", *branch.columns.shown())}
         changes = {name: int(event[name]) for name in ("index_before", "index_after")}
-        found.nodes[names[row]] = {
-            "kind": kind, "stage": stage, "breaks": event["breaks"].decode(), **changes, **about,
-            "arclength": float(event["arclength"]), **columns,
+        nodes.append(
+            (names[row], {"kind": kind, "stage": stage, "breaks": event["breaks"].decode(), **changes, **own, **columns})
+        )
+
+    def about(piece: Piece) -> dict:
+        ends, followed = [names[int(piece.rows[end])] for end in (0, -1)], branch.followed(piece.stage)
+        return {
+            "stage": piece.stage, "followed": followed, "factor": branch.scene.factor(followed),
+            "index": branch.index_on(piece.rows), "ends": ends, **own,
         }  # fmt: skip
-    for piece in branch.pieces():
-        rows = branch.points[piece.rows]
-        columns = {name: rows[name].tolist() for name in ("arclength", *branch.columns.shown())}
-        ends = names[int(piece.rows[0])], names[int(piece.rows[-1])]
-        followed = branch.followed(piece.stage)
-        own = {"followed": followed, "factor": branch.scene.factor(followed), "index": branch.index_on(piece.rows)}
-        found.edges.append((*ends, {"stage": piece.stage, **own, "ends": list(ends), **about, **columns}))
-    return found
 
-
-def add(graph, found: Part) -> None:
-    """Add a result to the graph."""
-    graph.add_nodes_from(found.nodes.items())
-    graph.add_edges_from(found.edges)
-
-
-def holds(graph, scene) -> bool:
-    """Return that each combination is computed."""
-    return False
-
-
-def lines(found: Part) -> list[str]:
-    """Return a result in words: its stages with their special points, and its notes."""
+    found = Part(nodes, edges_of(branch, names, branch.columns.shown(), about))
     graph = new_graph("", FORMAT)
     add(graph, found)
-    return [*listed(graph), *found.notes]
-
-
-def counts(graph, title: str) -> tuple[str, str]:
-    """Return how many branches and special points a diagram has, in two lines."""
-    kinds, files = [kind for _, kind in graph.nodes(data="kind")], {file for *_, file in graph.edges(data="file")}
-    return (
-        f"{title or TITLE}: {len(files)} branches",
-        f"{kinds.count('fold')} folds, {kinds.count('branch point')} branch points",
-    )
+    return replace(found, words=(*listed(graph), *branch.notes))
 
 
 def listed(graph) -> Iterator[str]:

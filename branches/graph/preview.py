@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from branches.graph import closed as diagram
+from branches.graph.parts import Part, add
 from branches.graph.stored import new_graph
 from branches.scene.closed import and_nu
 from branches.scene.fields import Scene
@@ -60,11 +61,11 @@ def _add(graph, family, points):
     columns |= {name: np.array([getattr(point, name) for point in points]) for name in ("kappa_n", "kappa_star", "energy")}
     special = [i for i, point in enumerate(points) if point.label]
     nodes = [_node(family, points[i], i) for i in special]
-    pieces = [
-        {**{name: values[a : b + 1].tolist() for name, values in columns.items()}, "exact": points[a : b + 1]}
-        for a, b in pairwise(special)
-    ]
-    diagram.connect(graph, family, nodes, pieces)
+    edges = []
+    for (a, b), ((first, _), (last, _)) in zip(pairwise(special), pairwise(nodes)):
+        piece = {name: values[a : b + 1].tolist() for name, values in columns.items()}
+        edges.append((first, last, {**family, **piece, "exact": points[a : b + 1]}))
+    add(graph, Part(nodes, edges))
 
 
 def _node(family, point, number):

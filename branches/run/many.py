@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from branches.graph.kinds import graph_kind
+from branches.graph.parts import add, counts
 from branches.graph.stored import DIAGRAM, new_graph, read_any, save
 from branches.run.display import Display
 from branches.run.executor import WAIT, executor, run_jobs, trouble
@@ -111,11 +112,11 @@ def run_many(
         graph = new_graph(sweep.title, kind.FORMAT)
         for file in sweep.scenes:
             if file in parts:
-                kind.add(graph, parts[file])
+                add(graph, parts[file])
         graph.graph.update({"config": dump(sweep), "failed": json.dumps(failed), "absent": json.dumps(sweep.absent)})
         save(graph, folder)
     display.many_summary(
-        _summary(sweep, kind.counts(graph, sweep.title), failed, left_out, (time.perf_counter() - began, folder))
+        _summary(sweep, counts(graph, kind, sweep.title), failed, left_out, (time.perf_counter() - began, folder))
     )
     return "lost" if failed else "complete"
 
@@ -170,7 +171,7 @@ def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -
     kind, parts = found
     graph = new_graph("", kind.FORMAT)
     for part in parts.values():
-        kind.add(graph, part)
+        add(graph, part)
     fresh, kept = [file for file in sweep.scenes if file not in parts], len(parts)
     plan, failed = _Plan(sweep, fresh, lambda scene: kind.holds(graph, scene)), {}
     _load_kernels([sweep.scenes[file] for file in fresh])
@@ -182,10 +183,10 @@ def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -
                 if part is not None:
                     write_bytes(folder / file, image)
                     parts[file] = part
-                    kind.add(graph, part)
+                    add(graph, part)
                 if problem:
                     failed[file] = problem
-                lines = [sweep.scenes[file].words(sweep.numbers[file])] if problem else kind.lines(part)
+                lines = [sweep.scenes[file].words(sweep.numbers[file])] if problem else part.words
                 display.branch_done(lines, problem, kept + done + len(plan.left_out))
     return {file: failed[file] for file in sweep.scenes if file in failed}, len(plan.left_out)
 

@@ -19,7 +19,7 @@ from branches.scene.labels import label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text
-from ribbon_model import convexity
+from ribbon_model import law_end
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.linear import covering, thresholds
@@ -92,7 +92,7 @@ class ClosedStage(Stage):
 
     def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
         """Return the settings of a run with this first point, which decides the symmetry that the index watches."""
-        events = convexity.test_functions(self.law)
+        events = law_end.closed_tests(self.law)
         if self.scene.stability:
             from branches.scene.index import SymmetryWatch  # eigenvalues, which nobody asked for otherwise
 
@@ -148,7 +148,7 @@ class ClosedStage(Stage):
 
     def _explained(self, run: Continuation) -> Stop:
         """Return why a run failed: the end of the law, or that no state was found, with what to change."""
-        margin, state, stop = convexity.margin(self.law), run.state, run.stop
+        margin, state, stop = law_end.margin(self.law), run.state, run.stop
         if stop.reason != Reason.NO_CONVERGENCE:
             return stop
         value = Solution.at(state.system, state.x).parameters["kappa_n"]

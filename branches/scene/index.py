@@ -9,7 +9,7 @@ from branches.scene.columns import Change
 from branches.scene.stage import Watch
 from contin import ConvergenceError, Event
 from contin.lowlevel import correct
-from ribbon_model.convexity import margin
+from ribbon_model.law_end import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode
 from ribbon_model.secondary import force

@@ -11,7 +11,7 @@ import numpy as np
 from branches.run.progress import Progress
 from contin import Settings, trace
 from contin.lowlevel import point_of
-from ribbon_model import convexity, linear, stability
+from ribbon_model import law_end, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.folding import Folding, folding
@@ -130,7 +130,7 @@ def at_natural_curvatures(
         return
     limits = {"kappa_n": (min(start, *kappas) - _REACH, max(start, *kappas) + _REACH)}
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 8, 7)
-    ends = convexity.test_functions(FINITE_WIDTH)
+    ends = law_end.closed_tests(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
     for point in trace(point_of(system, x), settings, tangent=tangent, progress=False):
         if point.label == "LP" and folds is not None:

@@ -23,6 +23,7 @@ from branches.graph import picture as draw_diagram
 from branches.graph.__main__ import main as graph_command
 from branches.graph.disentangle import crossings
 from branches.graph.interpolation import places
+from branches.graph.parts import Part
 from branches.graph.preview import preview
 from branches.graph.stored import read
 from branches.read import read_branch
@@ -528,4 +529,5 @@ def _course(config):
     family = {"law": config.law, "nu": config.nu, "m": config.m, "n": config.n}
     values = {"kappa_n": 1.0, "kappa_star": 1.0, "energy": -0.5}
     nodes = [diagram.node(family, kind, values, number) for number, kind in enumerate(("circle", "leaves"))]
-    return diagram.Course(family, config.file, config.name, nodes, [dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])])
+    ends = [name for name, _ in nodes]
+    return Part(nodes, [(*ends, {**family, "file": config.file, **dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])})])

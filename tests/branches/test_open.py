@@ -14,6 +14,7 @@ from branches.explore.gather import gather
 from branches.export import __main__ as export
 from branches.graph import __main__ as graph
 from branches.graph import open_strips as open_graph
+from branches.graph.parts import add
 from branches.graph.stored import OPEN_FORMAT, new_graph
 from branches.read import read_branch
 from branches.run import __main__ as run
@@ -266,7 +267,7 @@ def test_where_lists_stand_in_place_of_numbers():
 def test_a_stage_begins_at_the_node_of_the_one_before(tip):
     """The graph of one result: the second stage leaves the branch point of the first one."""
     one = new_graph("", OPEN_FORMAT)
-    open_graph.add(one, open_graph.part(read_branch(tip), "tip.h5", {"nu": 0.3}))
+    add(one, open_graph.part(read_branch(tip), "tip.h5", {"nu": 0.3}))
     edges = [(data["ends"], data["stage"], data["index"]) for *_, data in one.edges(data=True)]
     point = edges[0][0][1]
     assert "stage 1, branch point" in point and [ends[0] for ends, stage, _ in edges if stage == 2] == [point]

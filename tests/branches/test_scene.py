@@ -12,6 +12,7 @@ import pytest
 import contin
 from branches.explore.gather import gather
 from branches.graph.kinds import graph_kind
+from branches.graph.parts import add
 from branches.graph.stored import new_graph, save
 from branches.run.display import Display
 from branches.run.many import run_many
@@ -48,7 +49,7 @@ def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
         assert file["points"].attrs["twice"] == "twice the energy"
     kind = graph_kind(scene)
     graph = new_graph("", kind.FORMAT)
-    kind.add(graph, kind.part(branch, "x.h5", {}))
+    add(graph, kind.part(branch, "x.h5", {}))
     assert all(np.allclose(edge["twice"], 2 * np.array(edge["energy"])) for *_, edge in graph.edges(data=True))
     save(graph, tmp_path)
     assert "twice" in json.loads((tmp_path / "diagram.json").read_text())["edges"][0]
@@ -58,7 +59,7 @@ def test_a_column_is_one_line(tmp_path, monkeypatch, capsys):
     (axes,) = branch.plot(shapes=0, x="kappa_n", y="twice").axes
     assert axes.get_ylabel() == "twice the energy"
     older = kind.part(read_branch(tmp_path / "older.h5"), "older.h5", {})  # a file of the version before, without it
-    kind.add(graph, older)
+    add(graph, older)
     both = gather([str(tmp_path / "x.h5"), str(tmp_path / "older.h5")])
     assert [name for name, *_ in both["axes"]] == [name for name, *_ in page["axes"] if name != "twice"]
 

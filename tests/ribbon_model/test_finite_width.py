@@ -10,7 +10,7 @@ import pytest
 import contin
 from contin import Settings, trace
 from contin.lowlevel import point_of
-from ribbon_model import convexity, exact_finite_width, finite_width
+from ribbon_model import exact_finite_width, finite_width, law_end
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings
 from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
@@ -260,11 +260,11 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
 @pytest.mark.full
 def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
-    found = followed(3, 1, 10.0, events=convexity.test_functions(FINITE_WIDTH))
-    assert found.stop.reason == "event" and convexity.NAME in found.stop.message
+    found = followed(3, 1, 10.0, events=law_end.closed_tests(FINITE_WIDTH))
+    assert found.stop.reason == "event" and law_end.NAME in found.stop.message
     lost = exact_finite_width.curve(3, 1, wide(10.0))[-1]
     assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
-    assert not convexity.test_functions(RIBBON)
+    assert not law_end.closed_tests(RIBBON)
 
 
 @pytest.mark.sample(1)
@@ -274,7 +274,7 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
 
     The fold is that of degree 4 on 40 intervals. `exact_finite_width.curve` follows the branch to within 3e-4 and .05 of it.
     """
-    ends = convexity.test_functions(FINITE_WIDTH)
+    ends = law_end.closed_tests(FINITE_WIDTH)
     for intervals, degree in ((10, 7), (40, 4)):
         system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, {"nu": nu, "Gamma": Gamma}, intervals, degree)
         found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
@@ -294,9 +294,9 @@ def test_the_law_has_the_bending_of_the_single_loop(nu, Gamma):
 
 def test_the_outer_minimum_of_a_wide_strip_is_followed():
     """(1, 4) of steel, 200 x 5 x .1 mm; the fold is that of `exact_finite_width.curve`, which is lost at 11.7665."""
-    found = followed(1, 4, 7.853981634, events=convexity.test_functions(FINITE_WIDTH))
+    found = followed(1, 4, 7.853981634, events=law_end.closed_tests(FINITE_WIDTH))
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([17.723754], abs=1e-5)
-    assert found.points[-1]["kappa_n"] == pytest.approx(11.7665, abs=0.01) and convexity.NAME in found.stop.message
+    assert found.points[-1]["kappa_n"] == pytest.approx(11.7665, abs=0.01) and law_end.NAME in found.stop.message
 
 
 def test_a_circle_at_the_other_minimum_is_refused():
@@ -314,7 +314,7 @@ def test_a_branch_on_which_the_energy_has_two_minima():
     Its kappa_n is the closed form; the folds are those of `exact_finite_width.curve`, which takes 40 s.
     """
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, {"nu": 0.4, "Gamma": 40.0}, 10, 7)
-    ends = convexity.test_functions(FINITE_WIDTH)
+    ends = law_end.closed_tests(FINITE_WIDTH)
     found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([27.387660, -43.957859], abs=1e-6)
     assert found.stop.reason == "trivial branch"
@@ -325,9 +325,9 @@ def test_a_branch_on_which_the_energy_has_two_minima():
 def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
     """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 10, 7)
-    ends = convexity.test_functions(FINITE_WIDTH)
+    ends = law_end.closed_tests(FINITE_WIDTH)
     found = trace(point_of(system, x), trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends, tangent=tangent)
-    assert found.stop.reason == "event" and convexity.NAME in found.stop.message
+    assert found.stop.reason == "event" and law_end.NAME in found.stop.message
     assert found.points[-1]["kappa_n"] == pytest.approx(end, abs=0.01)
 
 
