@@ -19,13 +19,14 @@ from .names import exact_text
 from .results.colours import PALETTE, Colour
 from .results.columns import StoredColumns, read_columns
 from .results.cubic import hermite, through
+from .results.phase_response import PhaseResponse
 from .results.point import point_of
 from .search.trace import follow
 from .shown import shown
 
 __all__ = [
-    "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE", "State",
-    "Stop", "StoredColumns", "Trial", "basis", "cache_directory", "correct", "eigenbasis", "error", "exact_text",
-    "follow", "gradient", "hermite", "interpolation", "least", "locate_branch_point", "minimum", "point_of",
-    "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
+    "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE",
+    "PhaseResponse", "State", "Stop", "StoredColumns", "Trial", "basis", "cache_directory", "correct", "eigenbasis",
+    "error", "exact_text", "follow", "gradient", "hermite", "interpolation", "least", "locate_branch_point",
+    "minimum", "point_of", "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
 ]  # fmt: skip

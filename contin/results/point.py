@@ -22,6 +22,7 @@ from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import notebook, portrait
 from contin.results.axes import Axes
+from contin.results.phase_response import PhaseResponse
 from contin.results.profile import Profile
 from contin.results.record import Record
 from contin.results.sensitivity import sensitivities
@@ -321,6 +322,30 @@ class Point(Record):
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
         fold = self.label == Label.FOLD and self.column != PERIOD and not self.system.on_curve
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
+
+    def phase_response(self) -> PhaseResponse:
+        """Return the phase response of a cycle: its adjoint Z, with Z.F = 1, by one solve with a transposed matrix.
+
+        After a small change v of the states at time t the motion is early by Z(t).v, for good. On curves in two parameters it
+        is that of the cycle at this point of the curve. It takes another solution, on the mesh halved.
+
+        Raises
+        ------
+        ProblemError
+            The point is no cycle of an autonomous field, or a second multiplier is 1.
+
+        Examples
+        --------
+        >>> import contin
+        >>> def van_der_pol(u, p):
+        ...     return u.v, p.mu * (1 - u.x**2) * u.v - u.x
+        >>> orbit = contin.cycle(contin.CycleProblem(van_der_pol, ["x", "v"], {"mu": 1.0}), [1.0, 0.0])
+        >>> response = orbit.phase_response()
+        >>> bool(max(response.errors.values()) < 1e-6)
+        True
+        """
+        solution = self.system.solution
+        return PhaseResponse(solution, self.x[: solution.size])
 
     def phase_loads(self) -> dict[str, float]:
         """Return the multipliers, by name, of phase conditions that load the solution: no symmetry moves it along these.
