@@ -20,6 +20,7 @@ from .search.cycle import cycle
 from .search.diagram import Diagram, diagram
 from .search.further import Search
 from .search.homoclinic import homoclinic
+from .search.many import batch
 from .search.solving import solve
 from .search.trace import trace
 from .search.two_parameter import curve
@@ -30,6 +31,6 @@ __all__ = [
     "auto07p", "lowlevel",
     "AlgebraicProblem", "BoundaryValueProblem", "Branch", "ConnectionProblem", "ContinError", "ConvergenceError",
     "CycleProblem", "Diagram", "Event", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Search",
-    "Segment", "SegmentedProblem", "Settings", "VariationalProblem", "curve", "cycle", "diagram", "homoclinic", "load",
+    "Segment", "SegmentedProblem", "Settings", "VariationalProblem", "batch", "curve", "cycle", "diagram", "homoclinic", "load",
     "save", "solve", "trace",
 ]  # fmt: skip

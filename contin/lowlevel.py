@@ -13,6 +13,7 @@ Examples
 
 import sys
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import lazy_loader
@@ -21,9 +22,11 @@ import lazy_loader
 def names_of(module: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a module of names, which its stub lists.
 
-    lazy_loader keeps what it has found in the package; here it is kept in the module.
+    lazy_loader keeps what it has found in the package; here it is kept in the module. Version 0.6 also changes the class of the
+    package, and functions that name it could not be sent to other processes any more.
     """
     find, listed, names = lazy_loader.attach_stub("contin", file)
+    sys.modules["contin"].__class__ = ModuleType
 
     def found(name: str) -> Any:
         value = find(name)

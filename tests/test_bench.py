@@ -108,6 +108,8 @@ def test_the_table_of_many_branches():
     text = many.table(results)
     assert "| one process | 8.0 s | 12.5 |" in text and "| two processes | 5.0 s | 20.0 |" in text and "60 ms a branch" in text
     assert "Dask" not in text and "| Dask cluster of two workers | 4.0 s | 25.0 |" in many.table(results | {"cluster": 4.0})
+    rates = {name: {"rate": 30.0, "cpu": 0.033} for name in ("loop", "one", "two")}
+    assert "| `contin.batch`, two processes | 30 | 33 ms |" in many.table(results | {"batch": rates})
 
 
 def test_ratios_of_cycles():

@@ -1,7 +1,12 @@
-"""Many branches: Fig. 12 at many values of nu, in processes of this machine and on a Dask cluster; questions, and the page."""
+"""Many branches: Fig. 12 at many values of nu, in processes of this machine and on a Dask cluster; questions, and the page.
+
+And many parameter sets of one small problem: `contin.batch` beside a plain loop.
+"""
 
 from __future__ import annotations
 
+import functools
+import math
 import resource
 import subprocess
 import sys
@@ -18,6 +23,8 @@ LOW, HIGH = -0.9, 0.45
 QUESTIONS = ((), ("--at", 3.2), ("--where", 1, 2))
 #: Values of nu, and repeats.
 COUNT, REPEATS = 17, 3
+#: Parameter sets of a small problem.
+SETS = 200
 
 
 def run(quick: bool) -> dict:
@@ -27,7 +34,7 @@ def run(quick: bool) -> dict:
         folder = Path(name)
         nus = [round(LOW + (HIGH - LOW) * number / (count - 1), 6) for number in range(count)]
         (folder / "scene.yaml").write_text(SCENE.format(nus=nus))
-        results = _measured(folder, repeats)
+        results = _measured(folder, repeats) | {"batch": _batch(repeats)}
         try:
             return results | {"cluster": _cluster(folder, repeats)}
         except ImportError:
@@ -49,6 +56,45 @@ def _measured(folder: Path, repeats: int) -> dict:
         "branches": len(list(result.glob("*.h5"))), "one": median(times[1]), "two": median(times[2]), "cpu": median(cpu),
         "question": median(questions), "page": page["seconds"], "megabytes": (folder / "page.html").stat().st_size / 1e6,
     }  # fmt: skip
+
+
+def _fold(problem, values) -> float:
+    """Return the fold of Bratu's problem with saturation."""
+    import contin
+
+    start = contin.solve(problem, [0, 0], values)
+    return contin.trace(start, free=["lam"], limits={"lam": (0, 8), "mean": (-1, 3)}).labelled("LP")[0]["lam"]
+
+
+def _batch(repeats: int) -> dict:
+    """Return rates (sets a second) and processor times (s a set) of a loop, of `contin.batch` here and with two processes."""
+    import contin
+
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * math.exp(u.u / (1 + p.a * u.u))), lambda a, b, p: (a.u, b.u), ["u", "v"],
+        {"lam": 0.0, "a": 0.0}, functionals={"mean": lambda t, u, p: u.u},
+    )  # fmt: skip
+    sets = [{"a": 0.1 * number / SETS} for number in range(SETS)]
+    ways = {
+        "loop": lambda: [_fold(problem, values) for values in sets],
+        "one": functools.partial(contin.batch, _fold, problem, sets),
+        "two": functools.partial(contin.batch, _fold, problem, sets, workers=2),
+    }
+    _fold(problem, sets[0])
+    times = {name: [] for name in ways}
+    for _ in range(repeats):
+        for name, run in ways.items():
+            began, before = time.perf_counter(), _processor_time()
+            run()
+            times[name].append((time.perf_counter() - began, _processor_time() - before))
+    return {name: {"rate": SETS / median(t for t, _ in found), "cpu": median(t for _, t in found) / SETS}
+            for name, found in times.items()}  # fmt: skip
+
+
+def _processor_time() -> float:
+    """Return the processor time of this process and of those that it started and that have ended."""
+    usages = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
 def _cluster(folder: Path, repeats: int) -> float:
@@ -84,4 +130,14 @@ def table(results: dict) -> str:
         *lines, "",
         f"Processor time of all processes: {1e3 * results['cpu'] / count:.0f} ms a branch. A question takes "
         f"{results['question']:.2f} s, the page {results['page']:.0f} s; it has {results['megabytes']:.1f} MB.",
+        *(["", *_batch_table(results["batch"])] if "batch" in results else []),
     ])  # fmt: skip
+
+
+def _batch_table(rates: dict) -> list[str]:
+    """Return the throughput of `contin.batch` as a table."""
+    names = {"loop": "a loop", "one": "`contin.batch`", "two": "`contin.batch`, two processes"}
+    return [
+        f"| {SETS} folds of a boundary value problem | folds a second | processor time each |", "|---|---|---|",
+        *(f"| {name} | {rates[key]['rate']:.0f} | {1e3 * rates[key]['cpu']:.0f} ms |" for key, name in names.items()),
+    ]  # fmt: skip

@@ -56,6 +56,7 @@ def calls(tmp_path_factory):
         "trace": (contin.trace, {"start": start, "settings": FEW, "free": ["a"]}),
         "curve": (contin.curve, {"start": fold, "second": "b", "settings": FEW}),
         "diagram": (contin.diagram, {"start": start, "settings": FEW, "free": ["a"], "depth": 0}),
+        "batch": (contin.batch, {"function": abs, "problem": PARABOLA, "values": [{"a": 1.0}]}),
         "cycle": (contin.cycle, {"problem": CIRCLES, "start": [1.0, 0.1], "settle": 5.0, "intervals": 5}),
         "homoclinic": (contin.homoclinic, {"start": orbit, "free": ["mu"], "mesh": mesh, "newton": newton}),
         "save": (contin.save, {"branch": branch, "path": folder / "c.npz"}),
