@@ -1,4 +1,5 @@
 # The names of `contin.lowlevel`, and where they come from.
+from .boundary.second_variation import Undetermined
 from .boundary.system import Collocation
 from .collocation.basis import basis, interpolation
 from .continuation.run import Continuation
@@ -26,7 +27,7 @@ from .shown import shown
 
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE",
-    "PhaseResponse", "State", "Stop", "StoredColumns", "Trial", "basis", "cache_directory", "correct", "eigenbasis",
-    "error", "exact_text", "follow", "gradient", "hermite", "interpolation", "least", "locate_branch_point",
+    "PhaseResponse", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis", "cache_directory", "correct",
+    "eigenbasis", "error", "exact_text", "follow", "gradient", "hermite", "interpolation", "least", "locate_branch_point",
     "minimum", "point_of", "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
 ]  # fmt: skip

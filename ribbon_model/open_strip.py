@@ -19,8 +19,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import ContinError, Event, Point, ProblemError, VariationalProblem, solve
-from contin.lowlevel import Collocation, Continuation, shown
+from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
+from contin.lowlevel import Collocation, Continuation, Undetermined, shown
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
@@ -264,7 +264,7 @@ class OpenStrip:
             point = solve(self.problem, guess, values, **options)
         except ContinError as error:
             unloaded = {name: 0.0 for name in LOADS if name in self.numbers}
-            if unloaded and str(error).startswith(_NO_CONVERGENCE):
+            if unloaded and isinstance(error, ConvergenceError):
                 self._check_unloaded(guess, {**(values or {}), **unloaded}, options)
             reason = self._reason(error)
             if (
@@ -330,14 +330,11 @@ class OpenStrip:
             raise ProblemError(self._reason(error)) from error
 
     def _reason(self, error: Exception) -> str:
-        text = str(error)
-        if text.startswith(_NO_CONVERGENCE):
+        """Return why no state was found, in the words of strips."""
+        if isinstance(error, ConvergenceError):
             return self._not_found()
-        if "repeat or contradict" in text:
-            return UNDETERMINED
-        if "vanishes along a mode" in text:
-            return UNHELD
-        return text
+        text = str(error)
+        return UNDETERMINED if Undetermined.CONDITIONS in text else UNHELD if Undetermined.MODE in text else text
 
     def _not_found(self) -> str:
         """Return that no first state was found, and which numbers may be nearer to where one is known."""
@@ -466,8 +463,6 @@ UNDETERMINED = (
     "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
     "softness, or hold less"
 )
-#: How `contin.solve` begins to say that no state was found.
-_NO_CONVERGENCE = "Newton did not converge"
 #: States of the last end, as the potential of its loads takes them.
 _LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 #: Place of the last end from the first one, as integrals over the strip.

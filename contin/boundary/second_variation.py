@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,6 +158,24 @@ def _convexity(hll: Array) -> float:
     return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + _NO_CONTROL if np.all(largest > 0) else -1.0
 
 
+class Undetermined(StrEnum):
+    """Why nothing determines the state of a problem with an energy, or its multipliers: words of `ProblemError`.
+
+    Examples
+    --------
+    >>> import contin
+    >>> unheld = contin.VariationalProblem(lambda t, x, w, p: w.x**2, ["x"], {})
+    >>> try:
+    ...     contin.solve(unheld, [0.0])
+    ... except contin.ProblemError as error:
+    ...     print(Undetermined.MODE in str(error))
+    True
+    """
+
+    MODE = "energy: its second variation vanishes along a mode there, which nothing determines (hold more, or start elsewhere)"
+    CONDITIONS = "ends: the conditions held, with the integral ones, repeat or contradict each other, or have no slope"
+
+
 def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
     """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found.
 
@@ -176,9 +195,7 @@ def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
         return "energy: it is not convex in the controls there (Legendre's condition)"
     sizes = np.abs(found.eigenvalues)
     if sizes.size and not sizes.min() > _SINGULAR * sizes.max():
-        return (
-            "energy: its second variation vanishes along a mode there, which nothing determines (hold more, or start elsewhere)"
-        )
+        return Undetermined.MODE
     return ""
 
 
@@ -438,9 +455,7 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Arr
     if len(rows):
         _, singular, vectors = np.linalg.svd(rows)
         if singular[-1] < _DEPENDENT * singular[0]:
-            raise ProblemError(
-                "ends: the conditions held, with the integral ones, repeat or contradict each other, or have no slope"
-            )
+            raise ProblemError(Undetermined.CONDITIONS)
         free = vectors[len(rows) :].T
     values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)
     return values, free @ modes
