@@ -1,6 +1,7 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
 from . import auto07p, lowlevel
 from .boundary.segmented import Segment, SegmentedProblem
+from .boundary.segmented_variational import SegmentedVariationalProblem, VariationalSegment
 from .boundary.statement import BoundaryValueProblem
 from .boundary.variational import VariationalProblem
 from .collocation.mesh import MeshControl
@@ -31,6 +32,6 @@ __all__ = [
     "auto07p", "lowlevel",
     "AlgebraicProblem", "BoundaryValueProblem", "Branch", "ConnectionProblem", "ContinError", "ConvergenceError",
     "CycleProblem", "Diagram", "Event", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Search",
-    "Segment", "SegmentedProblem", "Settings", "VariationalProblem", "batch", "curve", "cycle", "diagram", "homoclinic", "load",
-    "save", "solve", "trace",
+    "Segment", "SegmentedProblem", "SegmentedVariationalProblem", "Settings", "VariationalProblem", "VariationalSegment",
+    "batch", "curve", "cycle", "diagram", "homoclinic", "load", "save", "solve", "trace",
 ]  # fmt: skip

@@ -80,6 +80,10 @@ def of_contin():
         ends=lambda a, b, p: (a.r - 1, b.r - 1),
     )  # fmt: skip
     catenoid = contin.solve(film, [1.0])
+    string = contin.VariationalSegment(lambda s, x, w, p: w.y**2 / 2 - p.load * x.y, ["y"])
+    strings = contin.SegmentedVariationalProblem(
+        [string] * 2, {"load": 1.0}, ends=lambda a, b, p: (a[0].y, a[1].y, b[0].y - b[1].y)
+    )
 
     def circle(t):
         return 0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t)
@@ -94,7 +98,7 @@ def of_contin():
     functions = lowlevel.Batch([lambda u, p: (u.x * p.a,)], [1], ["x"], ["a"], times=False)
     return [
         branch, fold, double, buckled, contin.curve(fold, free=["a", "b"], limits={"b": (-1, 2)}, progress=False),
-        contin.solve(walls, [0, 0]), catenoid, catenoid.second_variation(), orbit, orbit.floquet(), front, functions,
+        contin.solve(walls, [0, 0]), string, contin.solve(strings, [[0], [0]]), catenoid, catenoid.second_variation(), orbit, orbit.floquet(), front, functions,
         contin.MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0}), run, run.state,
         lowlevel.Trial.without_tangent(fold.system, fold.x), contin.Event("UZ", "x", lambda trial: trial["a"]),
         contin.Settings(), lowlevel.basis(4), contin.ProblemError("a sentence"), contin.ConvergenceError("a sentence"),

@@ -63,11 +63,11 @@ class Canonical:
     ``fixed`` are the states that end conditions fix, at the first and at the last end.
     """
 
-    rhs: RecordedFunction
+    rhs: Function
     boundary: RecordedFunction
-    integrals: RecordedFunction | None
-    functionals: Mapping[str, RecordedFunction]
-    legendre: RecordedFunction | None
+    integrals: Function | None
+    functionals: Mapping[str, Function]
+    legendre: Function | None
     sigmas: int
     fixed: tuple[tuple[int, ...], tuple[int, ...]]
 
@@ -83,7 +83,7 @@ def canonical(variation: Variation) -> Canonical:
         A function that cannot be differentiated, an energy that does not depend on a control, or end conditions that repeat
         each other.
     """
-    ends = _Ends(variation)
+    ends = EndConditions(variation)
     inside = _Inside(variation, ends.sigmas)
     functionals = {name: inside.function(f"functional {name}", [value], True) for name, value in inside.columns().items()}
     return Canonical(
@@ -294,8 +294,16 @@ def _pivots(second: Sequence[Sequence[Number]]) -> list[Number]:
     return pivots
 
 
-class _Ends:
-    """Conditions at the ends: operations on one tape, whose inputs are x and lambda at both ends, and all parameters."""
+class EndConditions:
+    """Conditions at the ends: operations on one tape, whose inputs are x and lambda at both ends, and all parameters.
+
+    Attributes
+    ----------
+    sigmas : int
+        Number of conditions that do more than fix one state.
+    fixed : tuple
+        As in `Canonical`.
+    """
 
     def __init__(self, variation: Variation) -> None:
         self.variation, self.tape = variation, Tape(NUMPY)

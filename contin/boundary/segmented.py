@@ -7,8 +7,8 @@ their ends, so elimination treats them one by one (`contin.linalg.layout`).
 
 from __future__ import annotations
 
-from collections import Counter, namedtuple
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -74,9 +74,24 @@ class Piece(NamedTuple):
     """A segment as the problem has it: names and places of its states, length and beginning as functions of p."""
 
     names: tuple[str, ...]
-    at: slice
+    at: tuple[int, ...]
     length: Function
     begin: Function
+
+    def of(self, u: Any) -> Any:
+        """Return its states as a named tuple, from all."""
+        return named_values(self.names)(*(u[place] for place in self.at))
+
+    def with_multipliers(self, count: int) -> Piece:
+        """Return the piece with a multiplier for each state; those of all ``count`` states stand behind these."""
+        names = (*self.names, *(f"lam_{name}" for name in self.names))
+        return self._replace(names=names, at=(*self.at, *(count + place for place in self.at)))
+
+    def extent(self, parameters: Mapping[str, float]) -> tuple[float, float]:
+        """Return the coordinates of both ends."""
+        values = named_values(tuple(parameters))(*parameters.values())
+        begin = float(self.begin(values))
+        return begin, begin + float(self.length(values))
 
     def __repr__(self) -> str:
         return shown(self)
@@ -134,8 +149,9 @@ class SegmentedProblem(BoundaryValueProblem):
             raise ProblemError("boundary must take 3 arguments, (a, b, p)")
         self._keep(segments=given, pieces=pieces)
         super().__init__(
-            _side_by_side([segment.rhs for segment in given], pieces), _between(boundary, pieces), _names(pieces), parameters,
-            functionals=_sums(given, pieces),
+            side_by_side([segment.rhs for segment in given], pieces), between(boundary, pieces),
+            joint_names([piece.names for piece in pieces]), parameters,
+            functionals=sums([segment.functionals for segment in given], pieces),
         )  # fmt: skip
 
     def _signatures(self) -> Mapping[str, Any]:
@@ -161,13 +177,6 @@ class SegmentedProblem(BoundaryValueProblem):
         segments = [segment.portable(piece.names, tuple(self.parameters)) for segment, piece in zip(self.segments, self.pieces)]
         return make, (kind, {**stated, "segments": segments})
 
-    def extent(self, index: int, parameters: Mapping[str, float]) -> tuple[float, float]:
-        """Return the coordinates of both ends of a segment."""
-        values = namedtuple("P", tuple(parameters))(**parameters)  # noqa: PYI024
-        piece = self.pieces[index]
-        begin = float(piece.begin(values))
-        return begin, begin + float(piece.length(values))
-
     def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
 
@@ -176,29 +185,25 @@ class SegmentedProblem(BoundaryValueProblem):
         ProblemError
             Another number of them.
         """
-        if not isinstance(guess, list) or not any(
-            callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess
-        ):
-            return guess
-        if len(guess) != len(self.pieces):
-            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(self.pieces)} segments")
-        return self._joined(guess, parameters)
+        return joined_guess(guess, self.pieces, [len(piece.names) for piece in self.pieces], parameters)
 
-    def _joined(self, guesses: Sequence[Any], parameters: Mapping[str, float]) -> Callable[[float], Array]:
-        """Return the states of all segments as a function of the place in [0, 1], from a guess for each segment."""
-        known: list[Any] = []
-        for index, (guess, piece) in enumerate(zip(guesses, self.pieces)):
-            begin, end = self.extent(index, parameters)
-            known.append((guess, begin, end, len(piece.names)))
 
-        def states(t: float) -> Array:
-            parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, a, b, _ in known]
-            for index, (part, (_, _, _, count)) in enumerate(zip(parts, known)):
-                if part.size != count:
-                    raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
-            return np.concatenate(parts)
+def joined_guess(guess: object, pieces: Sequence[Piece], counts: Sequence[int], parameters: Mapping[str, float]) -> Any:
+    """Return a guess of all states, on [0, 1], of a list with one for each segment, of so many states; others as they are."""
+    if not isinstance(guess, list) or not any(callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess):
+        return guess
+    if len(guess) != len(pieces):
+        raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(pieces)} segments")
+    extents = [piece.extent(parameters) for piece in pieces]
 
-        return states
+    def states(t: float) -> Array:
+        parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, (a, b) in zip(guess, extents)]
+        for index, (part, count) in enumerate(zip(parts, counts)):
+            if part.size != count:
+                raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
+        return np.concatenate(parts)
+
+    return states
 
 
 def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:
@@ -219,8 +224,8 @@ def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tup
             begin = _behind(pieces[-1])
         else:
             begin = of_parameters(f"{what}begin", 0.0, parameters)
-        at = pieces[-1].at.stop if pieces else 0
-        pieces.append(Piece(names, slice(at, at + len(names)), length, begin))
+        first = sum(len(piece.names) for piece in pieces)
+        pieces.append(Piece(names, tuple(range(first, first + len(names))), length, begin))
     return tuple(pieces)
 
 
@@ -239,52 +244,47 @@ def _check_function(what: str, function: Function, signature: Signature, count: 
         raise ProblemError(f"{what} returns {found or 'one number'}{' values' if found else ''}, must return {allowed}")
 
 
-def _names(pieces: Sequence[Piece]) -> tuple[str, ...]:
-    """Return the names of all states."""
-    count = Counter(name for piece in pieces for name in piece.names)
-    return tuple(f"{name}_{i}" if count[name] > 1 else name for i, piece in enumerate(pieces) for name in piece.names)
+def joint_names(names: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Return the names of the states of all segments: with the number of the segment where several have one."""
+    count = Counter(name for own in names for name in own)
+    return tuple(f"{name}_{i}" if count[name] > 1 else name for i, own in enumerate(names) for name in own)
 
 
 # --- functions of all states ----------------------------------------------------------------------------------------------
 
 
-def _states(pieces: Sequence[Piece], u: Named) -> list[Any]:
-    """Return the states of each segment as a named tuple."""
-    return [named_values(piece.names)(*list(u)[piece.at]) for piece in pieces]
-
-
-def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
+def side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
     """Return the right-hand side of all states on [0, 1]."""
 
     def rhs(t: float, u: Named, p: Named) -> Any:
-        values: list[Any] = []
-        for function, piece, own in zip(functions, pieces, _states(pieces, u)):
+        values: dict[int, Any] = {}
+        for function, piece in zip(functions, pieces):
             length = piece.length(p)
-            values += [length * rate for rate in function(piece.begin(p) + length * t, own, p)]
-        return values
+            rates = function(piece.begin(p) + length * t, piece.of(u), p)
+            values.update((place, length * rate) for place, rate in zip(piece.at, rates))
+        return [values[place] for place in range(len(values))]
 
     return rhs
 
 
-def _between(boundary: Function, pieces: Sequence[Piece]) -> Function:
-    """Return the conditions as a function of all states at both ends."""
+def between(function: Function, pieces: Sequence[Piece]) -> Function:
+    """Return ``function(a, b, p)`` of the states of the segments at both ends as a function of all states there."""
 
-    return lambda a, b, p: boundary(tuple(_states(pieces, a)), tuple(_states(pieces, b)), p)
+    return lambda a, b, p: function(tuple(piece.of(a) for piece in pieces), tuple(piece.of(b) for piece in pieces), p)
 
 
-def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Function]:
+def sums(functionals: Sequence[Mapping[str, Function]], pieces: Sequence[Piece]) -> dict[str, Function]:
     """Return the functionals: sums over the segments that have them."""
-    names = dict.fromkeys(name for segment in segments for name in segment.functionals)
-    return {name: _sum(name, segments, pieces) for name in names}
+    return {name: _sum(name, functionals, pieces) for name in dict.fromkeys(name for own in functionals for name in own)}
 
 
-def _sum(name: str, segments: Sequence[Segment], pieces: Sequence[Piece]) -> Function:
+def _sum(name: str, functionals: Sequence[Mapping[str, Function]], pieces: Sequence[Piece]) -> Function:
     def functional(t: float, u: Named, p: Named) -> Any:
         total = 0.0
-        for segment, piece, own in zip(segments, pieces, _states(pieces, u)):
-            if name in segment.functionals:
+        for own, piece in zip(functionals, pieces):
+            if name in own:
                 length = piece.length(p)
-                total = total + length * segment.functionals[name](piece.begin(p) + length * t, own, p)
+                total = total + length * own[name](piece.begin(p) + length * t, piece.of(u), p)
         return total
 
     return functional

@@ -131,15 +131,23 @@ class VariationalProblem(BoundaryValueProblem):
             energy, kinematics, ends, end_energy, hamiltonian, dict(integrals), dict(functionals), names, control_names,
             tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names),
         )  # fmt: skip
-        derived = canonical(variation)
+        phases = [f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held]
+        self._derive(variation, canonical(variation), parameters, symmetries, phases, domain)
+
+    def _derive(
+        self, variation: Variation, derived: Canonical, parameters: Mapping[str, float],
+        symmetries: Mapping[str, Symmetry] | None, phases: Sequence[str], domain: tuple[float, float] = (0.0, 1.0),
+    ) -> None:  # fmt: skip
+        """Become the boundary value problem of the derived equations."""
         self._keep(variation=variation, canonical=derived, symmetries=dict(symmetries or {}))
         for name in self.multipliers:
             if name in parameters:
                 raise ProblemError(f"parameters: {name} is the name of a multiplier, which is a parameter by itself")
+        names = variation.states
         super().__init__(
             derived.rhs, derived.boundary, (*names, *(f"lam_{name}" for name in names)),
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
-            phases=[f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held],
+            phases=phases,
         )  # fmt: skip
 
     def _signatures(self) -> Mapping[str, Arguments]:

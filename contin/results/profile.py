@@ -31,9 +31,9 @@ class Profile:
         if not declared(problem, "pieces"):
             raise ProblemError(nothing)
         checks.whole("segment", index, 0, len(problem.pieces) - 1)
-        self._at = problem.pieces[index].at
+        self._at = list(problem.pieces[index].at)
         self.names = problem.pieces[index].names
-        self.begin, self.end = problem.extent(index, point.parameters)
+        self.begin, self.end = problem.pieces[index].extent(point.parameters)
         self.s: Array = self.begin + (self.end - self.begin) * self._system.nodes
         self.states: Array = self._system.states(point.x)[:, self._at]
 
