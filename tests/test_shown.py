@@ -98,7 +98,8 @@ def of_contin():
     functions = lowlevel.Batch([lambda u, p: (u.x * p.a,)], [1], ["x"], ["a"], times=False)
     return [
         branch, fold, double, buckled, contin.curve(fold, free=["a", "b"], limits={"b": (-1, 2)}, progress=False),
-        contin.solve(walls, [0, 0]), string, contin.solve(strings, [[0], [0]]), catenoid, catenoid.second_variation(), orbit, orbit.floquet(), front, functions,
+        contin.solve(walls, [0, 0]), string, contin.solve(strings, [[0], [0]]),
+        catenoid, catenoid.second_variation(), orbit, orbit.floquet(), front, functions,
         contin.MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0}), run, run.state,
         lowlevel.Trial.without_tangent(fold.system, fold.x), contin.Event("UZ", "x", lambda trial: trial["a"]),
         contin.Settings(), lowlevel.basis(4), contin.ProblemError("a sentence"), contin.ConvergenceError("a sentence"),
