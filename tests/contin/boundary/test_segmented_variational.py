@@ -146,7 +146,7 @@ def test_equal_segments_are_derived_once(monkeypatch):
         ([replace(ROD, energy=lambda x: x)], None, "segments: 0: energy must take 4 arguments"),
         ([ROD], lambda a, b: a[0], "ends must take 3 arguments, (a, b, p)"),
         ([ROD], lambda a, b, p: (a[0].x, 2 * a[0].x), "ends: condition 2 repeats or contradicts those before it"),
-        ([ROD, VariationalSegment(None, ["q"], hamiltonian=lambda s, x, l, p: l.q**2)], None, "all must have an energy"),
+        ([ROD, VariationalSegment(None, ["q"], hamiltonian=lambda s, x, y, p: y.q**2)], None, "all must have an energy"),
     ],
 )
 def test_what_cannot_be_used_is_one_sentence(segments, ends, message):
