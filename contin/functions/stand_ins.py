@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from contin.functions.kernel_parts import names_in
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import (
     FUNCTIONS,
@@ -90,7 +89,7 @@ class _Copies:
         self._kept.append(function)
         copy.__defaults__ = None if function.__defaults__ is None else tuple(map(self.value, function.__defaults__))
         copy.__kwdefaults__ = {name: self.value(value) for name, value in (function.__kwdefaults__ or {}).items()} or None
-        for name in names_in(function.__code__):
+        for name in _globals_in(function.__code__):
             if name in function.__globals__:
                 scope[name] = self.value(function.__globals__[name])
             elif name in _BUILTINS:
@@ -185,6 +184,13 @@ class _Object:
 def _catches(code: types.CodeType) -> bool:
     """Return whether a function handles exceptions: not those of generators, and from Python 3.12 on of lists, that pass on."""
     return any(instruction.opname == "PUSH_EXC_INFO" for instruction in dis.get_instructions(code))
+
+
+def _globals_in(code: types.CodeType) -> set[str]:
+    """Return the names of global values that a code object, and those inside it, read; attributes may have the same names."""
+    inner = [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
+    own = {str(each.argval) for each in dis.get_instructions(code) if each.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
+    return own.union(*map(_globals_in, inner))
 
 
 def _may_hold_functions(value: Any) -> bool:

@@ -312,6 +312,20 @@ def test_what_cannot_be_recorded_is_said_once_with_the_reason():
         contin.solve(problem, [3.0])
 
 
+def load(path):
+    try:
+        return open(path)
+    except OSError:
+        return None
+
+
+def test_a_parameter_may_be_named_like_a_function_beside_it():
+    """The function above is not called: ``p.load`` is an attribute."""
+    batch = Batch([lambda u, p: (p.load * u.x,)], [1], ["x"], ["load"], times=False)
+    assert batch.interpreted is None
+    assert batch.values(np.zeros(1), np.array([[2.0]]), np.empty((0, 1)), np.array([3.0]))[0, 0] == 6
+
+
 def test_differences_beside_a_narrow_feature():
     """A step of width 1e-4 evaluated in Python: the derivative is right beside it, and its estimated error says how well."""
 
