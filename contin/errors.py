@@ -59,6 +59,6 @@ class ConvergenceError(ContinError, ArithmeticError):
 def warn(text: str, category: type[Warning]) -> None:
     """Warn at the line outside the package from which it was called, however deep inside it this is."""
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and f"{frame.f_globals.get('__name__', '')}.".startswith(_PACKAGE):
+    while frame.f_back is not None and f"{frame.f_globals.get('__name__', '')}.".startswith((_PACKAGE, "functools.")):
         frame, level = frame.f_back, level + 1
     warnings.warn(text, category, stacklevel=level)
