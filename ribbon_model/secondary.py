@@ -11,12 +11,15 @@ distinguishes a secondary branch: for the laws with omega_2 = 0 it vanishes only
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin.lowlevel import locate_branch_point
 from ribbon_model.domains import Domain
-from ribbon_model.solution import Solution
+
+if TYPE_CHECKING:  # what a caller has it from
+    from ribbon_model.solution import Solution
 
 #: Largest distance of the bifurcation on the half loop from the start of its search, relative to 1 + |kappa_n|.
 _NEAR = 1e-4

@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,12 +22,13 @@ from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import difference, parse
 from branches.scene.stage import Stage
 from branches.scene.stages import stages_of
-from branches.store.branch import StoredBranch
 from branches.store.files import StoreError, only_run, prepare
-from branches.store.read import computed_branch
 from branches.store.writer import BranchWriter, open_branch, read_kept, read_state
-from contin import Branch, Point, Reason, load, save
+from contin import Point, Reason
 from contin.lowlevel import Continuation, Stop
+
+if TYPE_CHECKING:
+    from branches.store.branch import StoredBranch
 
 
 def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool = False, overwrite: bool = False) -> str:
@@ -73,6 +75,8 @@ class Computed:
 
     def branch(self) -> StoredBranch:
         """Return the branch without its solutions, as its file gives it."""
+        from branches.store.read import computed_branch  # 6 ms, which a run to a file does not need
+
         return computed_branch(self.scene, (self.status, self.stop, self.reason), self.points, self.events, self.notes)
 
     def __repr__(self) -> str:
@@ -180,7 +184,6 @@ def _through(stage: Stage, run: Continuation, writer: BranchWriter, labelled: li
             continue
         display.point(stage, point, writer.count, run.state.step)
         writer.append(point, stage)
-        writer.note(stage.notes(run))
         labelled += [point] if point.label else []
         if run.stop is not stop:
             break  # the stage ends here, which its run does not know
@@ -188,11 +191,11 @@ def _through(stage: Stage, run: Continuation, writer: BranchWriter, labelled: li
             continue  # inside a step: a run cannot be resumed from here
         if run.state.system.scales.are_one:  # states with scales are not stored; such a stage begins again
             writer.mark(run.state)
-        if interruption.asked:
-            writer.checkpoint(run.start, "interrupted")
-            return False
-        if writer.due():
-            writer.checkpoint(run.start, "running")
+        if interruption.asked or writer.due():
+            writer.note(stage.notes(run))
+            writer.checkpoint(run.start, "interrupted" if interruption.asked else "running")
+            if interruption.asked:
+                return False
     writer.flush()
     return True
 
@@ -212,6 +215,8 @@ class _Kept:
 
 def _image(points: list[Point]) -> bytes:
     """Return labelled points of a stage as a file of `contin.save`."""
+    from contin import Branch, save  # 30 ms, which runs of one stage do not need
+
     with tempfile.TemporaryDirectory() as folder:
         save(Branch(points), Path(folder, "points.npz"))
         return Path(folder, "points.npz").read_bytes()
@@ -219,6 +224,8 @@ def _image(points: list[Point]) -> bytes:
 
 def _points(problem, image: bytes) -> list[Point]:
     """Return the points of an `_image`."""
+    from contin import load
+
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "points.npz").write_bytes(image)
         return load(problem, Path(folder, "points.npz")).points

@@ -25,7 +25,6 @@ from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.linear import covering, thresholds
 from ribbon_model.secondary import force, secondary_branch
 from ribbon_model.seeds import half_loop_branch, primary_branch
-from ribbon_model.solution import Solution
 
 #: The first points of primary branches, by domain.
 _SEEDS = {CELL.name: primary_branch, HALF_LOOP.name: half_loop_branch}
@@ -151,7 +150,7 @@ class ClosedStage(Stage):
         margin, state, stop = law_end.margin(self.law), run.state, run.stop
         if stop.reason != Reason.NO_CONVERGENCE:
             return stop
-        value = Solution.at(state.system, state.x).parameters["kappa_n"]
+        value = state.system.parameter(state.x, "kappa_n")
         finite = np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step))))
         left = math.inf if margin is None or finite else margin(state.system, state.x)
         if left > _NEARLY_CONVEX:
@@ -278,9 +277,10 @@ def _leave_primary(scene: ClosedScene):
     ConfigError
         The primary branch does not pass through the origin, or no branch leaves it there.
     """
-    solution = Solution.of(_at_origin(scene))
+    from ribbon_model.solution import Solution  # 10 ms, which other branches do not need
+
     try:
-        return secondary_branch(solution, DOMAINS[scene.domain])
+        return secondary_branch(Solution.of(_at_origin(scene)), DOMAINS[scene.domain])
     except (ContinError, ValueError) as error:
         raise ConfigError(f"origin: {error}") from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,17 +15,19 @@ from contin.boundary.second_variation import SecondVariation, second_variation
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.trial import Trial
-from contin.cycles.floquet import Floquet, floquet
 from contin.errors import ProblemError
 from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
-from contin.results import notebook, portrait
+from contin.results import notebook
 from contin.results.axes import Axes
-from contin.results.phase_response import PhaseResponse
 from contin.results.profile import Profile
 from contin.results.record import Record
 from contin.results.sensitivity import sensitivities
+
+if TYPE_CHECKING:
+    from contin.cycles.floquet import Floquet
+    from contin.results.phase_response import PhaseResponse
 
 #: So many columns stand in the representation of a point.
 _SHOWN = 8
@@ -187,6 +189,8 @@ class Point(Record):
         >>> len(axes.lines)
         2
         """
+        from contin.results import portrait  # as `floquet`
+
         return portrait.plot(underlying(self), what, states, axes)
 
     @checks.arguments
@@ -320,6 +324,8 @@ class Point(Record):
         """
         if not self.system.solution.is_cycle:
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
+        from contin.cycles.floquet import floquet  # 25 ms, which points of other problems do not need
+
         fold = self.label == Label.FOLD and self.column != PERIOD and not self.system.on_curve
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
 
@@ -344,6 +350,8 @@ class Point(Record):
         >>> bool(max(response.errors.values()) < 1e-6)
         True
         """
+        from contin.results.phase_response import PhaseResponse  # as `floquet`
+
         solution = self.system.solution
         return PhaseResponse(solution, self.x[: solution.size])
 
