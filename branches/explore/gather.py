@@ -11,7 +11,7 @@ from branches.graph.stored import DIAGRAM, read_any
 from branches.run.executor import executor, run_jobs
 from branches.run.progress import Progress
 from branches.store.files import StoreError
-from branches.store.layout import OPEN
+from branches.store.layout import CLOSED, OPEN
 from branches.store.read import read_branch
 
 #: Ending of the files that `contin.save` writes.
@@ -64,9 +64,16 @@ def left_out(data: dict) -> list[dict]:
 
 
 def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
-    """Return the data of a page of strips."""
-    if read_branch(files[0]).scene.KIND == OPEN:
-        return open_strips.gathered(files, next(filter(None, titles), ""))
+    """Return the data of a page of strips, of the kind of the first one."""
+    pages = {CLOSED: _of_closed_strips, OPEN: _of_open_strips}
+    return pages[read_branch(files[0]).scene.KIND](files, titles, progress)
+
+
+def _of_open_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
+    return open_strips.gathered(files, next(filter(None, titles), ""))
+
+
+def _of_closed_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
     branches = _read(files, progress)
     title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
     families: dict[tuple, list[dict]] = {}

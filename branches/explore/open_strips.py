@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.explore.packing import column, compressed
-from branches.explore.profiles import KINDS
+from branches.explore.profiles import marked
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import OPEN
@@ -49,16 +49,11 @@ def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) ->
     values = np.array([_states(branch, int(row)) for row in rows])
     labels = [branch.points["label"][row].decode() for row in rows]
     names = {int(event["point"]): event["name"].decode() for event in branch.events}
-    marks = [
-        {"point": place, "kind": KINDS.get(label, "end"), "name": " ".join(filter(None, (label, names.get(int(row), ""))))}
-        for place, (row, label) in enumerate(zip(rows, labels))
-        if label
-    ]
     kept, last = [*columns, "arclength", "index"], number == branch.points["stage"][-1]
     return {
         "profile": True, "domain": "open", "name": f"{path.stem}, stage {number}: {branch.followed(number)}",
-        "file": f"{path.stem}_{number}.h5", "stop": branch.stop if last else "", "marks": marks,
-        "labels": {place: label for place, label in enumerate(labels) if label},
+        "file": f"{path.stem}_{number}.h5", "stop": branch.stop if last else "",
+        **marked(labels, [names.get(int(row), "") for row in rows]),
         "columns": {name: column(branch.points[name][rows]) for name in kept}, "components": [],
         "shapes": compressed(values),
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,17 +70,22 @@ def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
     kept = [*axes, *(name for name in ("arclength", "index") if name in stored.columns and name not in axes)]
     count = min(max(len(times) for times, _ in stored.profiles), _MOST_NODES)
     values = np.array([_sampled(times, states, count) for times, states in stored.profiles])
-    marks = [
-        {"point": number, "kind": KINDS.get(label, "end"), "name": " ".join(filter(None, (label, stored.names[number])))}
-        for number, label in enumerate(stored.labels)
-        if label
-    ]
     return {
-        "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop, "marks": marks,
-        "labels": {number: label for number, label in enumerate(stored.labels) if label},
+        "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop,
+        **marked(stored.labels, stored.names),
         "columns": {name: column(stored.columns[name]) for name in kept}, "components": stored.states,
         "shapes": compressed(values, each=True),
     }  # fmt: skip
+
+
+def marked(labels: Sequence[str], names: Sequence[str]) -> dict:
+    """Return the marks and the labels of a branch from label and name of each point, '' for those without."""
+    there = {number: label for number, label in enumerate(labels) if label}
+    marks = [
+        {"point": number, "kind": KINDS.get(label, "end"), "name": f"{label} {names[number]}".rstrip()}
+        for number, label in there.items()
+    ]
+    return {"marks": marks, "labels": there}
 
 
 def _sampled(times: np.ndarray, states: np.ndarray, count: int) -> np.ndarray:

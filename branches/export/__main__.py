@@ -183,11 +183,6 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 # --- the strip --------------------------------------------------------------------------------------------------------
 
 
-def placed(branch: StoredBranch, point: int, length: float, cells: int = 0) -> tuple[Shape, ndarray]:
-    """Return the strip of a point at this length, and its strains (K, 3) in radians per unit of that length."""
-    return branch.placed(point, length, cells)
-
-
 def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
     """Return the content of all files of --out."""
     from branches.export.mesh_files import encode, library
@@ -198,9 +193,9 @@ def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
             library(ending)
     point, length = labelled_point(branch, options.point), options.length or branch.length
     if ".csv" in endings.values():
-        table = _table(*placed(branch, point, length))
+        table = _table(*branch.placed(point, length))
     if any(ending in SURFACES for ending in endings.values()):
-        shape, strains = placed(branch, point, length, _CELLS)
+        shape, strains = branch.placed(point, length, _CELLS)
         mesh, fields = _mesh(branch, shape, length, options), _fields(shape, strains)
     return {Path(name): table if end == ".csv" else encode(mesh, end, fields) for name, end in endings.items()}
 

@@ -102,7 +102,7 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
             progress.part(f"({m}, {n})")
             known = folds if (m, n) == (1, 2) else []
             try:
-                found = list(at_natural_curvatures(m, n, [strip.kappa_n], strip.poisson_ratio, strip.Gamma, known))
+                found = list(at_natural_curvatures(m, n, [strip.kappa_n], strip.parameters, known))
             except TwoBendings:
                 found, lost = [], [*lost, (m, n)]
             for point, equilibrium in found:
@@ -115,7 +115,7 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
 
 
 def at_natural_curvatures(
-    m: int, n: int, kappas: Sequence[float], nu: float, Gamma: float, folds: list | None = None
+    m: int, n: int, kappas: Sequence[float], parameters: Mapping[str, float], folds: list | None = None
 ) -> Iterator[tuple]:
     """Yield the points of a branch at values of kappa_n, with their equilibria; its folds are added to ``folds``.
 
@@ -125,11 +125,11 @@ def at_natural_curvatures(
         See `ribbon_model.seeds.primary_branch`.
     """
     try:
-        start = linear.thresholds(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma})[0]
+        start = linear.thresholds(FINITE_WIDTH, m, n, parameters)[0]
     except NoThreshold:
         return
     limits = {"kappa_n": (min(start, *kappas) - _REACH, max(start, *kappas) + _REACH)}
-    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, {"nu": nu, "Gamma": Gamma}, 8, 7)
+    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, parameters, 8, 7)
     ends = law_end.closed_tests(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
     for point in trace(point_of(system, x), settings, tangent=tangent, progress=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,17 +28,17 @@ _GAMMAS, _PARTS = np.geomspace(0.05, 100.0, 13), np.linspace(0.002, 0.998, 22)
 _LONGEST = (-1.0, 2.5)
 
 
-def barriers_at(m: int, kappas: Sequence[float], nu: float, Gamma: float) -> np.ndarray:
+def barriers_at(m: int, kappas: Sequence[float], parameters: Mapping[str, float]) -> np.ndarray:
     """Return the barrier of the m-fold circle at natural curvatures (K,), over 2 pi B 2 pi/L; nan where it is not stable.
 
     It is that of the lowest state of index 1 on the primary branches (m, m - 1) and (m, m + 1), which lead to the circles of
     m - 2 and m + 2 turns; nan where there is none, too.
     """
-    lowest, parameters = np.full(len(kappas), np.nan), {"nu": nu, "Gamma": Gamma}
+    lowest = np.full(len(kappas), np.nan)
     for n in (m - 1, m + 1):
         if n < 1:
             continue
-        for point, equilibrium in at_natural_curvatures(m, n, kappas, nu, Gamma):
+        for point, equilibrium in at_natural_curvatures(m, n, kappas, parameters):
             at = int(np.argmin(np.abs(np.asarray(kappas) - point["kappa_n"])))
             if stability.index(equilibrium).index == 1:
                 lowest[at] = np.fmin(lowest[at], point["energy"])
@@ -50,7 +50,7 @@ def barriers_at(m: int, kappas: Sequence[float], nu: float, Gamma: float) -> np.
 
 def barrier(strip: Strip, m: int) -> float:
     """Return the barrier in J of the loop of m turns; nan where it is not stable, or no saddle was found."""
-    return float(barriers_at(m, [strip.kappa_n], strip.poisson_ratio, strip.Gamma)[0]) * strip.energy_unit
+    return float(barriers_at(m, [strip.kappa_n], strip.parameters)[0]) * strip.energy_unit
 
 
 # --- dimensions for a barrier -----------------------------------------------------------------------------------------
@@ -119,9 +119,10 @@ def chart(strip: Strip, m: int, out: Path, quiet: bool = True) -> None:
     with Progress("widths", len(_GAMMAS), quiet) as progress:
         for Gamma in _GAMMAS:
             progress.part(f"Gamma = {Gamma:.3g}")
-            low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, strip.parameters | {"Gamma": float(Gamma)}), *_LONGEST)
+            parameters = strip.parameters | {"Gamma": float(Gamma)}
+            low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, parameters), *_LONGEST)
             kappas.append(m * (low + (high - low) * _PARTS))
-            table.append(barriers_at(m, kappas[-1], strip.poisson_ratio, float(Gamma)))
+            table.append(barriers_at(m, kappas[-1], parameters))
             progress.part_done()
     write_picture(_figure(strip, m, np.array(kappas), np.array(table)), out)
 

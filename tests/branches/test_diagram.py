@@ -13,6 +13,7 @@ from concurrent.futures import Future
 import networkx
 import numpy as np
 import pytest
+from crossings import crossings
 from scipy.interpolate import CubicSpline
 
 from branches import plot
@@ -21,7 +22,6 @@ from branches.export.__main__ import main as export_command
 from branches.graph import closed as diagram
 from branches.graph import picture as draw_diagram
 from branches.graph.__main__ import main as graph_command
-from branches.graph.disentangle import crossings
 from branches.graph.interpolation import places
 from branches.graph.parts import Part
 from branches.graph.preview import preview

@@ -104,7 +104,7 @@ def test_vtk_files_hold_strains_and_directors(write, results, ending):
 
 def test_limits_of_width_and_thickness_are_those_of_a_regular_solid(results):
     """Just within them, all cells of the solid are on the right side: its faces look outward everywhere."""
-    shape, _ = export.placed(read_branch(results), _fold(results), 1.0)
+    shape, _ = read_branch(results).placed(_fold(results), 1.0)
     width = 0.95 * widest(shape)
     mesh = solid(shape, width, 0.95 * thickest(shape, width))
     assert _along(mesh, shape).min() > 0
@@ -127,7 +127,7 @@ def test_a_law_of_rods_has_straight_sections_and_Gamma_gives_a_width(results):
     assert wide.width_at(10, options.thickness) == pytest.approx(math.sqrt(4.0 * 0.02 * 10 / (2 * math.pi)))
     assert branch.width_at(10, options.thickness) is None
     rod = dataclasses.replace(branch, scene=branch.scene.model_copy(update={"law": "flat rod"}))
-    assert not export.placed(rod, _fold(results), 1.0)[0].eta.any()
+    assert not rod.placed(_fold(results), 1.0)[0].eta.any()
 
 
 # --- table ------------------------------------------------------------------------------------------------------------

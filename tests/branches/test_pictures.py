@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from crossings import crossings
 from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -20,7 +21,6 @@ from branches.draw.style import colour_of
 from branches.export import __main__ as export
 from branches.export.film import drawn as frames
 from branches.export.film import evenly
-from branches.graph.disentangle import crossings
 from branches.graph.picture import WINDOW, circles, conjugate, heights, legend, lines
 from branches.graph.picture import figure as diagram_figure
 from branches.graph.preview import preview

@@ -183,11 +183,12 @@ def test_barriers_are_those_of_the_quadrature():
 @pytest.mark.full
 def test_a_barrier_vanishes_where_stability_ends():
     """Of the 3-fold circle at both ends of its stable interval, where its way out, (1, 2) or (3, 4), bifurcates."""
-    ends = [3 * end for end in energy_interval(FINITE_WIDTH, 3, 0.3, 0.1)]
+    narrow = {"nu": 0.3, "Gamma": 0.1}
+    ends = [3 * end for end in energy_interval(FINITE_WIDTH, 3, narrow)]
     inside, outside = [ends[0] + 0.05, ends[1] - 0.05], [ends[0] - 0.05, ends[1] + 0.05]
-    near, further = barriers_at(3, inside, 0.3, 0.1), barriers_at(3, [ends[0] + 0.1, ends[1] - 0.1], 0.3, 0.1)
+    near, further = barriers_at(3, inside, narrow), barriers_at(3, [ends[0] + 0.1, ends[1] - 0.1], narrow)
     assert (near > 0).all() and (further > 3 * near).all()  # quadratic: a subcritical pitchfork
-    assert all(map(math.isnan, barriers_at(3, outside, 0.3, 0.1)))
+    assert all(map(math.isnan, barriers_at(3, outside, narrow)))
 
 
 @pytest.mark.full
