@@ -24,6 +24,7 @@ from branches.run.progress import Progress
 from branches.run.runner import compute_scene
 from branches.scene.closed import ClosedScene
 from branches.scene.fields import ConfigError
+from branches.scene.labels import PRIMARY
 from branches.scene.parse import dump, parse
 from branches.store.branch import StoredBranch
 from branches.store.command import Parser, complain, write_output
@@ -201,7 +202,7 @@ def _goes(graph, file: str) -> str:
     end = branch["nodes"][-1]
     if end["kind"] == "secondary bifurcation":
         return f"the branch ({end['m']}, {end['n']}) at {end['kappa_n']:.8f}"
-    if end["kind"] == "primary branch":
+    if end["kind"] == PRIMARY:
         return f"a primary branch that the diagram does not hold, at {end['kappa_n']:.8f}"
     if end["kind"] == "leaves":
         return f"the scene's own limit, {end['what']}"

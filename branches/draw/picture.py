@@ -9,7 +9,7 @@ import numpy as np
 
 from branches.draw.strip import View, draw_strip, reach_of
 from branches.draw.style import LINES, OTHER, UNKNOWN, in_words
-from branches.scene.labels import END
+from branches.scene.labels import END, begins
 
 #: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
 _PANELS = 4
@@ -111,7 +111,7 @@ def choose(branch, count: int, stages: set[int]) -> list[int]:
     s = branch.way[kept]
     labelled = branch.points["label"][kept] != b""
     spacing = (s[-1] - s[0]) / max(count - 1, 1) or 1.0
-    again = {int(event["point"]) for event in branch.events if event["name"] == b"start" and event["point"]}  # drawn before
+    again = {int(event["point"]) for event in branch.events if begins(event) and event["point"]}  # drawn before
     chosen = []
     for target in np.linspace(s[0], s[-1], count):
         distance = np.abs(s - target) - 0.45 * spacing * labelled

@@ -14,7 +14,7 @@ from branches.graph.interpolation import places
 from branches.graph.parts import Part, add, edges_of, special
 from branches.graph.stored import CLOSED_FORMAT, COLUMNS
 from branches.scene.closed import ClosedScene, law_of
-from branches.scene.labels import kind_of
+from branches.scene.labels import PRIMARY, kind_of
 from branches.store.branch import Piece
 from contin.lowlevel import exact_text
 from ribbon_model.linear import circle, covering
@@ -26,7 +26,7 @@ COUNTED = {
     "circle": "bifurcations of circles", "fold": "folds", "leaves": "branches that end at the scene's own limits",
 }  # fmt: skip
 #: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
-_MEETINGS = ("secondary bifurcation", "primary branch")
+_MEETINGS = ("secondary bifurcation", PRIMARY)
 #: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
 _SAME = 1e-6
 

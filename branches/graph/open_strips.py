@@ -13,7 +13,7 @@ from typing import Any
 
 from branches.graph.parts import Part, add, edges_of, special
 from branches.graph.stored import OPEN_FORMAT, new_graph
-from branches.scene.labels import label_of, without_round_off
+from branches.scene.labels import START, begins, label_of, without_round_off
 from branches.store.branch import Piece
 from branches.store.open_branch import OpenBranch
 from contin.lowlevel import exact_text
@@ -30,11 +30,10 @@ def part(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
     nodes, own = [], {"file": file, "numbers": numbers}
     for event in special(branch):
         row, stage = int(event["point"]), int(event["stage"])
-        begins = event["name"] == b"start"
-        if begins and stage > 1:
+        if begins(event) and stage > 1:
             names[row] = names[branch.origin(stage)]
             continue
-        kind = "start" if begins else label_of(event["label"].decode()).kind
+        kind = START if begins(event) else label_of(event["label"].decode()).kind
         names[row] = f"{file}: stage {stage}, {kind} {row}"
         columns = {name: float(event[name]) for name in ("arclength", *branch.columns.shown())}
         changes = {name: int(event[name]) for name in ("index_before", "index_after")}

@@ -16,7 +16,7 @@ from branches.graph.parts import Part, add
 from branches.graph.stored import new_graph
 from branches.scene.closed import and_nu
 from branches.scene.fields import Scene
-from branches.scene.labels import kind_of
+from branches.scene.labels import START, kind_of
 from branches.scene.sweep import Sweep
 from ribbon_model import exact
 
@@ -69,6 +69,6 @@ def _add(graph, family, points):
 
 
 def _node(family, point, number):
-    kind = kind_of(point.label, "start" if point.label == "BP" else "", "limit", False)  # ends are circles or limits
+    kind = kind_of(point.label, START if point.label == "BP" else "", "limit", False)  # ends are circles or limits
     values = {"kappa_n": point.kappa_n, "kappa_star": point.kappa_star, "energy": point.energy}
     return diagram.node(family, kind, values, number)

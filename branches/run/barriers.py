@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.run.progress import Progress
+from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point
 from contin.lowlevel import Collocation, exact_text
@@ -77,7 +78,7 @@ def _stable_rows(branch: OpenBranch) -> Iterator[int]:
     seen: list[int] = []
     for event in branch.events:
         row = int(event["point"])
-        if event["name"] == b"start" or event["label"] not in (b"EP", b"UZ") or event["index"] != 0:
+        if begins(event) or event["label"] not in (b"EP", b"UZ") or event["index"] != 0:
             continue
         if not any(branch.same_strip(row, other) for other in seen):
             seen.append(row)

@@ -19,6 +19,7 @@ import numpy as np
 
 from branches.run.display import Display
 from branches.scene.fields import ConfigError, Scene
+from branches.scene.labels import START
 from branches.scene.parse import difference, parse
 from branches.scene.stage import Stage
 from branches.scene.stages import stages_of
@@ -187,7 +188,7 @@ def _through(stage: Stage, run: Continuation, writer: BranchWriter, labelled: li
         labelled += [point] if point.label else []
         if run.stop is not stop:
             break  # the stage ends here, which its run does not know
-        if point.label and point.name != "start":
+        if point.label and point.name != START:
             continue  # inside a step: a run cannot be resumed from here
         if run.state.system.scales.are_one:  # states with scales are not stored; such a stage begins again
             writer.mark(run.state)

@@ -15,7 +15,7 @@ from branches.scene.closed import ClosedScene
 from branches.scene.columns import FOUND, NUMBER, Column, Columns, error_of
 from branches.scene.errors import errors_of
 from branches.scene.fields import ConfigError
-from branches.scene.labels import label_of
+from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text
@@ -117,11 +117,11 @@ class ClosedStage(Stage):
         if self.scene.origin is not None:
             if point.label == "LP" and force(point) < _BESIDE:
                 return None
-            if point.name == "start" or not point.is_simple_branch_point or force(point) >= _NO_FORCE:
+            if point.name == START or not point.is_simple_branch_point or force(point) >= _NO_FORCE:
                 return point
-            run.stop = Stop("primary branch", "reached a primary branch, where R = 0")
-            return dataclasses.replace(point, label="EP", name="primary branch")
-        if point.name != "trivial branch":
+            run.stop = Stop(PRIMARY, "reached a primary branch, where R = 0")
+            return dataclasses.replace(point, label="EP", name=PRIMARY)
+        if point.name != TRIVIAL:
             return point
         index = covering(self.law, self.scene.law_parameters, point["kappa_n"], point["kappa_star"], point["energy"])
         if is_threshold(self.scene, index, point["kappa_n"], point.errors.get("kappa_n", math.nan)):
@@ -187,15 +187,15 @@ class ClosedStage(Stage):
         scene = self.scene
         label, name = event["label"], event["name"].decode()
         place = f"kappa_n L/2pi = {event['kappa_n']:.10f}"
-        found = name in ("trivial branch", "primary branch")
+        found = name in (TRIVIAL, PRIMARY)
         held = label == b"UZ" or (label == b"EP" and not found)  # kappa_n was given, not found
         error = event["error_kappa_n"]
         certain = "" if held or math.isnan(error) else f" (± {error:.0e})"
-        if name == "start" and scene.origin:
+        if name == START and scene.origin:
             return f"leaves the branch ({scene.m}, {scene.n}) at {place}{certain}, {scene.origin.mode}"
-        if name == "start":
+        if name == START:
             return f"leaves the {scene.m}-covered circle at {place}{certain}"
-        if name == "trivial branch":
+        if name == TRIVIAL:
             columns = (float(event[name]) for name in ("kappa_n", "kappa_star", "energy"))
             index = covering(self.law, scene.law_parameters, *columns)
             inside_out = ", curled against its natural curvature" if index < 0 else ""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from branches.scene.labels import label_of
 from contin import Point
 from contin.lowlevel import error, point_of
 
@@ -23,7 +24,7 @@ def errors_of(point: Point, found: Found) -> dict[str, float]:
     """
     here = found(point)
     place = point.errors.get(point.system.free[0], np.nan)
-    if point.label == "MX" or (point.label in ("LP", "BP") and np.isnan(place)):
+    if point.label == "MX" or (label_of(point.label).singular and np.isnan(place)):
         return dict.fromkeys(here, np.nan)
     errors = error(point, lambda trial: np.array([*found(point_of(trial.system, trial.x)).values()]))
     largest: dict[str, float] = {}

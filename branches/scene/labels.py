@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from contin.lowlevel import Colour
 
@@ -28,6 +29,8 @@ class Label:
         In pictures of one branch, as matplotlib takes them.
     told : bool
         Whether pictures write the value of the number that is followed beside it.
+    singular : bool
+        Whether the index is undecided there, and the place is found, not given: it has an error.
     """
 
     word: str
@@ -36,12 +39,13 @@ class Label:
     colour: str
     size: int
     told: bool = False
+    singular: bool = False
 
 
 LABELS = {
-    "LP": Label("fold", "fold", "*", FOLD, 170, True),
-    "BP": Label("branch point", "branch point", "o", END, 45),
-    "SB": Label("secondary bifurcation", "secondary bifurcation", "D", SECONDARY, 40),
+    "LP": Label("fold", "fold", "*", FOLD, 170, told=True, singular=True),
+    "BP": Label("branch point", "branch point", "o", END, 45, singular=True),
+    "SB": Label("secondary bifurcation", "secondary bifurcation", "D", SECONDARY, 40, singular=True),
     "UZ": Label("user value", "user value", "D", USER, 40),
     "EP": Label("end", "end", "o", END, 45),
     "MX": Label("end", "lost", "x", END, 40),
@@ -53,6 +57,12 @@ CONJUGATE = {
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
     "weight": "rise", "roller": "F_roller", "stroke": "F_stroke",
 }  # fmt: skip
+#: The name of the first point of a run.
+START = "start"
+#: The name of an end on a circle.
+TRIVIAL = "trivial branch"
+#: The name of an end where a secondary branch meets a primary one.
+PRIMARY = "primary branch"
 #: Labels of points at which the pieces of a branch begin and end.
 SPECIAL = ("LP", "BP", "SB", "EP", "MX")
 #: Marks of kinds in diagrams: marker, colour, size, words; the words of an end are those of its point.
@@ -62,7 +72,7 @@ MARKS = {
 }  # fmt: skip
 #: Kinds as the explorer page knows them; the others are 'end'.
 ON_PAGE = {
-    "circle": "circle", "fold": "fold", "secondary bifurcation": "secondary", "primary branch": "secondary",
+    "circle": "circle", "fold": "fold", "secondary bifurcation": "secondary", PRIMARY: "secondary",
     "user value": "user", "lost": "lost", "leaves": "limit",
 }  # fmt: skip
 
@@ -70,6 +80,11 @@ ON_PAGE = {
 def label_of(text: str) -> Label:
     """The label of these letters; that of an end for letters of another version."""
     return LABELS.get(text, LABELS["EP"])
+
+
+def begins(event: Any) -> bool:
+    """Return whether a row of the table of labelled points is that of the first point of a run."""
+    return bool(event["name"] == START.encode())
 
 
 def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
@@ -84,11 +99,11 @@ def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
     secondary : bool
         Whether it is on a secondary branch.
     """
-    if name == "start":
+    if name == START:
         return "secondary bifurcation" if secondary else "circle"
-    if name == "trivial branch":
+    if name == TRIVIAL:
         return "circle"
-    if name == "primary branch":
+    if name == PRIMARY:
         return name
     kind = label_of(label).kind
     return "leaves" if kind == "end" and reason == "limit" else kind

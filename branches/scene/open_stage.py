@@ -326,12 +326,13 @@ class OpenStage(Stage):
         label, error = event["label"].decode(), event[f"error_{name}"] * factor
         shown = dict.fromkeys(("energy", CONJUGATE.get(name, "energy")))  # and what is conjugate to the followed number
         others = "".join(f", {text}" for text in (self._with_error(event, column) for column in shown) if text)
-        found = f" (± {error:.0e})" if label in ("LP", "BP") and not math.isnan(error) else ""
+        singular = label_of(label).singular
+        found = f" (± {error:.0e})" if singular and not math.isnan(error) else ""
         place = f"{name} = {_rounded(without_round_off(event[name], largest) * factor, error)}{found}"
         what = event["name"].decode()
         change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
         broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
-        told = what if "=" not in what and (label not in ("LP", "BP") or "kernel" in what) else ""  # not the value once more
+        told = what if "=" not in what and (not singular or "kernel" in what) else ""  # not the value once more
         kind = f" ({told})" if told else ""
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
+from branches.scene.labels import START
 from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text
@@ -178,7 +179,7 @@ class StageConfig(Strict):
         if self.start_at is None:
             return len(labelled) - 1
         label, _, count = self.start_at.partition(" ")
-        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != "start"]
+        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != START]
         return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
 
 

@@ -15,7 +15,7 @@ from branches.draw.strip import OBLIQUE, View
 from branches.draw.style import smooth
 from branches.scene.columns import Columns
 from branches.scene.fields import Scene
-from branches.scene.labels import SPECIAL, Label, label_of
+from branches.scene.labels import SPECIAL, Label, begins, label_of
 from branches.scene.meant import meant
 from branches.scene.parse import dump
 from branches.scene.stages import stages_of
@@ -194,7 +194,7 @@ class StoredBranch(ABC):
         if "index" not in self.points.dtype.names:
             return -1
         inside = rows[1:-1] if len(rows) > 2 else rows
-        regular = [row for row in inside if self.points["label"][row] not in (b"LP", b"BP", b"SB")]
+        regular = [row for row in inside if not label_of(self.points["label"][row].decode()).singular]
         values = {value for value in self.points["index"][regular].tolist() if value >= 0}
         if not regular and "index_before" in self.events.dtype.names:
             sides = ((rows[0], "index_after"), (rows[-1], "index_before"))
@@ -299,7 +299,7 @@ class StoredBranch(ABC):
     def marks(self) -> Iterator[Mark]:
         """Yield the marks of labelled points."""
         for event in self.events:
-            if event["name"] != b"start":
+            if not begins(event):
                 label = label_of(event["label"].decode())
                 yield Mark(int(event["point"]), label, event["label"] == b"EP", label.word)
 
