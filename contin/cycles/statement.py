@@ -23,6 +23,7 @@ from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
 from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
+from contin.problems.mass import Mass
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
@@ -73,6 +74,8 @@ class CycleProblem(BoundaryValueProblem):
     angles : sequence of str, or mapping of str to float, optional
         States in which the field is periodic, with the period 2 pi or, in a mapping, any other. Functionals should be periodic
         in them, too: the mean of another one depends on where the round begins.
+    mass : matrix, or sequence of float, optional
+        As for an `AlgebraicProblem`, of M u' = F. Of states without rates the mean is a column.
 
     Raises
     ------
@@ -121,7 +124,7 @@ class CycleProblem(BoundaryValueProblem):
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
         functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
-        angles: Angles = (),
+        angles: Angles = (), mass: Any = None,
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", {} if functionals is None else functionals, "functions"))
         names = check_statement(states, parameters, means)
@@ -135,13 +138,16 @@ class CycleProblem(BoundaryValueProblem):
         signature = Signature(names, tuple(parameters), times=forced)
         field = returning(field, signature)
         check_field(field, signature, _FORCED if forced else _AUTONOMOUS)
+        field, kept_mass = _with_mass(field, mass, names, forced)
         count = len(names)
         turn = _turn(symmetry, forced, count)
         check_equivariance(field, turn, names, parameters)
         check_lattice(turn, names, periods)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
         rhs = scaled(field, PERIOD, order_of(turn)) if found is None else _scaled_by_forcing(field, found)
-        self._keep(field=field, means=means, period=found, symmetry=turn, order=order_of(turn), angles=periods)
+        if kept_mass is not None and symmetry is not None:
+            raise ProblemError("symmetry: must be left out where states have no rates (mass)")
+        self._keep(field=field, means=means, period=found, symmetry=turn, order=order_of(turn), angles=periods, mass=kept_mass)
         own = {**({ROUNDS: 1.0} if forced else {PERIOD: 1.0}), **windings}
         super().__init__(rhs, _periodic(turn, names, periods), names, {**parameters, **own})
         columns = [*extremes, PERIOD] if forced else extremes
@@ -204,6 +210,68 @@ class CycleProblem(BoundaryValueProblem):
         return found
 
     @functools.cached_property
+    def _at_rest(self) -> AlgebraicProblem:
+        """The equilibria of the field; of a forced one with the time as a parameter."""
+        own, forced = (PERIOD, ROUNDS, *winding_names(self.angles)), self.period is not None
+        parameters = {name: value for name, value in self.parameters.items() if name not in own}
+        field = _at_time(self.field, tuple(parameters)) if forced else self.field
+        means, time = ({}, {_TIME: 0.0}) if forced else (self.means, {})
+        return AlgebraicProblem(field, self.state_names, {**parameters, **time}, means, angles=self.angles)
+
+    def without_found(self, start: Sequence[float]) -> CycleProblem:
+        """Return the same cycles without states that have no rates, which are found from a start.
+
+        Examples
+        --------
+        >>> def oscillator(u, p):
+        ...     return u.v, -p.k * u.x - u.drag, u.drag + u.drag**3 - u.v
+        >>> CycleProblem(oscillator, ["x", "v", "drag"], {"k": 4.0}, mass=[1, 1, 0]).without_found([0.0])
+        CycleProblem(states x, v; parameters k, period)
+        """
+        arguments, names, mass = 2 if self.period is None else 3, self.state_names, self.mass
+        own = (PERIOD, ROUNDS, *winding_names(self.angles))
+        parameters = {name: value for name, value in self.parameters.items() if name not in own}
+
+        def of_kept(function: Function) -> Function:
+            found: Function = mass.of_kept(function, self.field, names, start, arguments)
+            return found
+
+        def state(place: int) -> Function:
+            return lambda *given: given[-2][place]
+
+        means = {name: of_kept(function) for name, function in self.means.items()}
+        means |= {names[i]: of_kept(state(i)) for i in mass.found}
+        kept = [names[i] for i in mass.kept]
+        angles = {name: period for name, period in self.angles.items() if name in kept}
+        rates = of_kept(mass.rates_of(self.field, arguments))
+        return CycleProblem(rates, kept, parameters, functionals=means, period=self.period, angles=angles)
+
+    def check_index(self, states: Array, parameters: Mapping[str, float]) -> None:
+        """Check that the equations without rates determine the states that have none, at a place.
+
+        Raises
+        ------
+        ProblemError
+
+        Examples
+        --------
+        A rod of the length 1, with the force that holds it: a pendulum in Cartesian coordinates has the index 3.
+
+        >>> def pendulum(u, p):
+        ...     return u.vx, u.vy, -u.force * u.x, -u.force * u.y - p.g, u.x**2 + u.y**2 - 1
+        >>> problem = CycleProblem(pendulum, ["x", "y", "vx", "vy", "force"], {"g": 1.0}, mass=[1, 1, 1, 1, 0])
+        >>> try:
+        ...     problem.check_index(np.array([0.6, -0.8, 0.0, 0.0, 0.8]), {"g": 1.0})
+        ... except ProblemError as error:
+        ...     print(str(error).partition(",")[0])
+        mass: the equations without rates do not determine force at the guess
+        """
+        known = {name: value for name, value in parameters.items() if name in self._at_rest.parameters}
+        with np.errstate(all="ignore"):
+            jacobian = self._at_rest.discretized((), known).jacobian(states)
+        self.mass.check_index(jacobian, self.state_names)
+
+    @functools.cached_property
     def reduced(self) -> ReducedProblem | None:
         """The equilibria of the field with conserved totals as parameters; None where nothing is conserved.
 
@@ -212,12 +280,7 @@ class CycleProblem(BoundaryValueProblem):
         ProblemError
             A total is conserved by a forced field, or by one whose symmetry is stated.
         """
-        own = (PERIOD, ROUNDS, *winding_names(self.angles))
-        parameters = {name: value for name, value in self.parameters.items() if name not in own}
-        field = self.field if self.period is None else _at_time(self.field, tuple(parameters))
-        time = {} if self.period is None else {_TIME: 0.0}
-        means = self.means if self.period is None else {}
-        found = AlgebraicProblem(field, self.state_names, {**parameters, **time}, means, angles=self.angles).reduced
+        found = self._at_rest.reduced
         if found is not None and (self.period is not None or self.order > 1):
             what, totals = "a forced field" if self.period is not None else "a field with a symmetry", found.conserved
             states = checks.listed(found.following)
@@ -301,6 +364,14 @@ def _at_time(field: Function, names: Sequence[str]) -> Function:
     """Return a forced field as one whose time is a parameter."""
     known: Any = namedtuple("P", names)  # type: ignore[misc]  # noqa: PYI024
     return lambda u, p: field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in names)))
+
+
+def _with_mass(field: Function, mass: Any, names: Sequence[str], forced: bool) -> tuple[Function, Mass | None]:
+    """Return the field times the inverse of a regular mass matrix, and a singular one."""
+    if mass is None:
+        return field, None
+    found = Mass.of(mass, names)
+    return (found.rates_of(field, 2 + forced), None) if found.is_regular else (field, found)
 
 
 def _turn(symmetry: Any, forced: bool, count: int) -> Array:

@@ -21,6 +21,7 @@ from contin.functions import round_off
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.angles import angle_periods, check_periodic
+from contin.problems.mass import Mass
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 from contin.problems.vector_field import returning
 
@@ -58,6 +59,9 @@ class AlgebraicProblem(Restated):
     angles : sequence of str, or mapping of str to float, optional
         States in which the residual is periodic, with the period 2 pi or, in a mapping, any other. Solutions that differ by
         whole rounds are the same: a branch that comes back one round on is closed.
+    mass : matrix, or sequence of float, optional
+        The constant matrix M of M u' = F(u, p), or its diagonal. A state whose column is zero has no rate: it is a column,
+        found from the equations without rates, which must determine it (an index of one), from the value of the guess on.
 
     Raises
     ------
@@ -80,6 +84,7 @@ class AlgebraicProblem(Restated):
     jacobian: Function | None = None
     pattern: Any = None
     angles: Any = ()
+    mass: Any = None
     #: There is no t.
     domain: ClassVar[None] = None
 
@@ -99,8 +104,23 @@ class AlgebraicProblem(Restated):
             warn(what, DeprecationWarning)
         if self.dynamics and self.equation_size != len(self.state_names):
             self._keep(dynamics=False)
+        if self.mass is not None:
+            self._take_mass()
         self._keep(angles=angle_periods(self.angles, self.state_names))
         self._check_angles()
+
+    def _take_mass(self) -> None:
+        """Analyse the mass matrix; a regular one is inverted."""
+        if not self.dynamics:
+            raise ProblemError("mass: is for as many equations as states, and with dynamics; leave it out")
+        mass = Mass.of(self.mass, self.state_names)
+        field = returning(self.residual, self._signature)
+        if mass.is_regular:
+            arrays = self._signature.fills(self.residual)
+            jacobian = self.jacobian and mass.jacobian_of(self.jacobian, arrays)
+            self._keep(residual=mass.rates_of(field, 2), jacobian=jacobian, count=None, mass=None)
+        else:
+            self._keep(residual=field, jacobian=None, count=None, mass=mass)
 
     def _check_angles(self) -> None:
         if self.angles:
@@ -146,8 +166,17 @@ class AlgebraicProblem(Restated):
     def reduced(self) -> ReducedProblem | None:
         """The same equilibria with conserved totals as parameters, without the states that follow; None where nothing is
         conserved."""
-        totals = conservation_laws(self) if type(self) is AlgebraicProblem else ()
+        totals = conservation_laws(self)
         return ReducedProblem(self, totals) if len(totals) else None
+
+    def without_found(self, start: Sequence[float]) -> AlgebraicProblem:
+        """Return the same equilibria without states that have no rates, which are found from a start."""
+        return KeptProblem(self, start)
+
+    def check_index(self, states: Array, parameters: Mapping[str, float]) -> None:
+        """Check that the equations without rates determine the states that have none, at a place."""
+        with np.errstate(all="ignore"):
+            self.mass.check_index(self.discretized((), parameters).jacobian(states), self.state_names)
 
     def check_totals(self, u: Array, p: Array) -> None:
         """Check that what was found to be conserved stays at states and parameters; here nothing was."""
@@ -214,6 +243,31 @@ class AlgebraicProblem(Restated):
             matrix = matrix.copy()
             round_off.move(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         return matrix
+
+
+class KeptProblem(AlgebraicProblem):
+    """The equilibria of M u' = F with a singular M: states without rates are found, from a start, and are columns.
+
+    Parameters
+    ----------
+    whole : AlgebraicProblem
+    start : sequence of float
+        Of the states that are found, in their order.
+    """
+
+    def __init__(self, whole: AlgebraicProblem, start: Sequence[float]) -> None:
+        mass, names = whole.mass, whole.state_names
+
+        def of_kept(function: Function) -> Function:
+            found: Function = mass.of_kept(function, whole.residual, names, start, 2)
+            return found
+
+        functionals = {name: of_kept(function) for name, function in whole.functionals.items()}
+        functionals |= {names[i]: of_kept(_state(names[i])) for i in mass.found}
+        kept = [names[i] for i in mass.kept]
+        angles = {name: period for name, period in whole.angles.items() if name in kept}
+        rates = of_kept(mass.rates_of(whole.residual, 2))
+        super().__init__(rates, kept, whole.parameters, functionals, angles=angles)
 
 
 class ReducedProblem(AlgebraicProblem):

@@ -38,7 +38,7 @@ from contin.functions.kernel_parts import (
     whole,
 )
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
-from contin.functions.program import CODES, Inputs, Program, program
+from contin.functions.program import CODES, TIME, Inputs, Program, program
 from contin.functions.tape import Tape
 
 if TYPE_CHECKING:
@@ -637,7 +637,8 @@ def of_columns(tape: Tape, places: Sequence[int], slots: Sequence[Hashable]) -> 
 
     def values(u: Array) -> Array:
         out, none = np.empty((len(u), len(places))), np.empty((0, 0))
-        run(found, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
+        times = u[:, list(slots).index(TIME)].copy() if TIME in slots else np.zeros(len(u))
+        run(found, (times, u, none), none.ravel(), out, np.empty((0, 0, 0)))
         return out
 
     return values

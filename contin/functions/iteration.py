@@ -26,7 +26,7 @@ from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
 #: Largest number of unknowns that are found together. Their equations are solved with a dense matrix at every point.
-_MOST = 16
+MOST = 16
 
 
 @dataclass(frozen=True)
@@ -260,8 +260,8 @@ def _sought(
     for each in starts:
         if not (isinstance(each, Number) or checks.is_number(each)):
             raise ProblemError(f"start: {checks.shown(each)} must be a number")
-    if not 1 <= len(starts) <= _MOST:
-        raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
+    if not 1 <= len(starts) <= MOST:
+        raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {MOST}")
     if argument_count(checks.function("function", function)) != 1:
         raise ProblemError(f"function: {checks.shown(function)} must take 1 argument, a list of the unknowns")
     function = prepared(function)

@@ -75,6 +75,8 @@ class Restated:
     dynamics = False
     #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
     spare: str | None = None
+    #: A singular mass matrix.
+    mass: Any = None
     #: The problem with conserved totals as parameters; None where nothing is conserved.
     reduced: Any = None
     #: Of problems that are put together from segments: their parts.

@@ -170,9 +170,13 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     """
 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
-        stated, own = problem, _statement(problem)
-        if head["states"] != own["states"]:  # without states that follow from totals
-            stated = problem.on_totals
+        stated: Any = problem
+        own = _statement(problem)
+        if head["states"] != own["states"]:  # without states that follow from others
+            if problem.mass is not None:
+                columns = head["points"][0]["functionals"]
+                stated = stated.without_found([columns.get(problem.state_names[i], 0.0) for i in problem.mass.found])
+            stated = stated.on_totals
             own = _statement(stated)
         if any(head[name] not in (own[name], _UNTOLD) for name in own):
             raise ProblemError(f"{str(path)!r} is of another problem: {_said(head)}, not {_said(own)}")

@@ -16,6 +16,7 @@ from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
+from contin.search.guess import restated
 from contin.search.solving import solve
 
 #: A motion that is further off, relative to 1 + where it began, goes to infinity: towards a pole steps of the integrator shrink
@@ -79,10 +80,8 @@ def cycle(
     6.663287
     """
     checks.number("settle", settle, 0)
-    first, values = _numbers(start, len(problem.state_names)), dict(parameters or {})
-    if problem.reduced is not None:
-        first, totals = problem.reduced.without_totals(first)
-        problem, values = problem.on_totals, {**totals, **values}
+    found = restated(problem, _numbers(start, len(problem.state_names)), dict(parameters or {}))
+    problem, first, values = found[0], np.asarray(found[1]), found[2]
     values = {**problem.parameters, **values}
     field = _vector_field(problem, values)
     if problem.period is None:

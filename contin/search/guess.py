@@ -17,7 +17,7 @@ from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
-from contin.results.point import Point
+from contin.results.point import Point, underlying
 from contin.results.record import over_t
 from contin.search.lagrange import with_guessed_multipliers
 
@@ -39,7 +39,36 @@ class Options:
     degree: int
 
 
-def on_totals(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+def restated(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+    """Return a problem without states that follow from others, the guess for it, and the parameters.
+
+    These are states without rates, and those that follow from conserved totals.
+    """
+    return _on_totals(*_with_rates(problem, guess, parameters))
+
+
+def _with_rates(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+    """Return a problem without states that have no rates, and the guess for it.
+
+    Raises
+    ------
+    ProblemError
+        The states that have none are not determined at the guess.
+    """
+    mass, names = problem.mass, problem.state_names
+    if mass is None:
+        return problem, guess, parameters
+    if isinstance(guess, Point) and not {*guess.system.problem.states} - {names[i] for i in mass.kept}:
+        known = underlying(guess)
+        return problem.without_found([known[names[i]] for i in mass.found]), guess, parameters
+    guess, first = _taken(problem, guess, lambda states: (states[..., mass.kept], states.reshape(-1, len(names))[0]))
+    first = np.zeros(len(names)) if first is None else first
+    problem.check_index(first, {**problem.parameters, **parameters})
+    found = problem.without_found(first[mass.found])
+    return found, np.zeros(len(mass.kept)) if guess is None else guess, parameters
+
+
+def _on_totals(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
     """Return a problem without the states that follow from conserved totals, the guess, and the parameters with totals of it.
 
     Raises
@@ -50,25 +79,37 @@ def on_totals(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple
     reduced = problem.reduced
     if reduced is None:
         return problem, guess, parameters
-    found, count, kept_of = problem.on_totals, len(problem.state_names), reduced.without_totals
-    if isinstance(guess, Point):
-        if tuple(guess.system.problem.states) == found.state_names:
-            return found, guess, parameters
-        guess = _of_point(guess)
+    found = problem.on_totals
+    if isinstance(guess, Point) and tuple(guess.system.problem.states) == found.state_names:
+        return found, guess, parameters
     given = all(name in parameters for name in reduced.total_names)
     if guess is None and not given:
         raise ProblemError(f"guess: must be given, or the totals among the parameters, since {reduced.conserved}")
-    totals: dict[str, float] = {}
+    is_numbers = not (callable(guess) or isinstance(guess, Point) or _is_pair(guess))
+    if given and is_numbers and (guess is None or np.size(_numbers(guess)) == len(found.state_names)):
+        return found, guess, parameters
+    guess, totals = _taken(problem, guess, reduced.without_totals)
+    return found, guess, {**totals, **parameters}
+
+
+def _taken(problem: Any, guess: Guess, taken: Callable[[Array], tuple[Array, Any]]) -> tuple[Guess, Any]:
+    """Return a guess with ``taken(states)[0]`` of its states (..., n), and the other value, at its first place or of all.
+
+    Without a guess both are None.
+    """
+    count = len(problem.state_names)
+    if guess is None:
+        return None, None
+    if isinstance(guess, Point):
+        guess = _of_point(guess)
     if callable(guess):
         whole = guess
-        totals = kept_of(_sampled(whole, np.array(problem.domain[:1]), count))[1]
-        guess = lambda t: kept_of(_sampled(whole, np.array([t]), count)[0])[0]  # noqa: E731
-    elif _is_pair(guess):
-        states, totals = kept_of(_sampled(guess, _numbers(guess[0]), count))
-        guess = guess[0], states
-    elif guess is not None and not (given and _numbers(guess).size == len(found.state_names)):
-        guess, totals = kept_of(_numbers(guess, count))
-    return found, guess, {**totals, **parameters}
+        first = taken(_sampled(whole, np.array(problem.domain[:1]), count))[1]
+        return (lambda t: taken(_sampled(whole, np.array([t]), count)[0])[0]), first
+    if _is_pair(guess):
+        states, value = taken(_sampled(guess, _numbers(guess[0]), count))
+        return (guess[0], states), value
+    return taken(_numbers(guess, count))
 
 
 def _of_point(point: Point) -> Guess:

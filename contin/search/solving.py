@@ -23,7 +23,7 @@ from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
 from contin.search.deflation import correct_away
-from contin.search.guess import Guess, Options, first_guess, on_totals
+from contin.search.guess import Guess, Options, first_guess, restated
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -78,7 +78,7 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
     forget_changed(problem)
-    problem, guess, parameters = on_totals(problem, guess, _checked(parameters))
+    problem, guess, parameters = restated(problem, guess, _checked(parameters))
     _check_others(problem, others)
     free = with_multipliers(problem, free)
     if isinstance(guess, Point):

@@ -464,3 +464,17 @@ def test_problems_travel_and_compare_by_value():
     carried = pickle.loads(pickle.dumps(one))
     assert carried == one
     assert np.array_equal(contin.solve(carried, [0, 0]).x, contin.solve(one, [0, 0]).x)
+
+
+def test_a_search_reads_the_time():
+    """The root of w + w^3 = cos t is recorded with its time, also where Python evaluates the recording to compare both."""
+
+    def field(t, u, p):
+        (w,) = root(lambda w: (w[0] + w[0] ** 3 - math.cos(t),), [0.0])
+        return (w,)
+
+    batch = Batch([field], [1], ["x"], [])
+    assert batch.interpreted is None
+    times = np.linspace(0, 3, 7)
+    found = batch.values(times, np.zeros((7, 1)), np.empty((0, 1)), np.empty(0))[:, 0]
+    assert np.abs(found + found**3 - np.cos(times)).max() < 1e-14
