@@ -1,5 +1,5 @@
 # The public names, and where they come from. `import ribbon_model` loads none of them: each is imported when it is first used.
-from . import exact, linear
+from . import exact, linear, network
 from .descent import descend
 from .domains import CELL, HALF_LOOP
 from .ends import End
@@ -15,5 +15,5 @@ from .strip import Strip
 
 __all__ = [
     "CELL", "End", "FINITE_WIDTH", "FLAT_ROD", "HALF_LOOP", "ISOTROPIC_ROD", "Law", "OpenStrip", "Parameter", "RIBBON", "ROD",
-    "Roller", "Section", "Solution", "Strip", "descend", "exact", "linear", "primary_branch", "secondary_branch",
+    "Roller", "Section", "Solution", "Strip", "descend", "exact", "linear", "network", "primary_branch", "secondary_branch",
 ]  # fmt: skip

@@ -17,7 +17,7 @@ def states_at(section: Section, t) -> np.ndarray:
     data = [section.datum(name) for name in NATURAL]
     p, t = SimpleNamespace(**section.parameters), np.atleast_1d(np.asarray(t, dtype=float))
     if not set(NATURAL) & set(section.along):
-        return _helix(np.array([datum(0.0, p) for datum in data]), t)
+        return helix(np.array([datum(0.0, p) for datum in data]), t)
     from scipy.integrate import solve_ivp  # takes .5 s, and is needed where natural strains vary only
 
     def rates(s, x):
@@ -40,7 +40,7 @@ def end_numbers(section: Section) -> dict[str, float]:
     return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
 
 
-def _helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
+def helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Return quaternion and centreline (K, 7) at places t (K,) of a strip whose strains are constant."""
     size = float(np.linalg.norm(strains))
     axis, tangent = strains / (size or 1.0), np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,659 @@
+"""Networks: strips that meet at joints, under loads, as one variational problem.
+
+Members are drawn first: each begins at a place with a frame, and has constant strains (none: it is straight). The state of a
+member is the quaternion q of its frame and its centreline r, as that of an open strip (`ribbon_model.open_strip`). With the
+drawn frame q0 of an end, its joint frame is
+
+    J = q conj(q0),
+
+the identity as it is drawn. A rigid joint keeps the joint frames and the places of its ends together, a hinge about an axis e
+keeps J e together, a ball joint the places only. An end may be turned by an angle about an axis before it is joined, and
+joined at an arm, fixed on its directors. What several members share balances there (`contin.SegmentedVariationalProblem`), and
+the index is that of the whole network.
+
+A network that is held nowhere floats: those rigid motions are held that leave all loads as they are. The reactions to that are
+zero, which is a check (`Network.reactions`).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from contin import ContinError, Point, ProblemError, SegmentedVariationalProblem, VariationalSegment, solve, trace
+from contin.lowlevel import Collocation
+from ribbon_model import ends, natural_state
+from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
+from ribbon_model.section import Section
+from ribbon_model.shape import Shape, quaternions, shape_of
+
+#: Kinds of joints.
+RIGID, HINGE, BALL = "rigid", "hinge", "ball"
+#: Ends of a member.
+START, FINISH = "start", "finish"
+#: The number that closes the gaps and turns of the joints, from 0 (as drawn) to 1.
+ASSEMBLY = "assembly"
+#: A quaternion, scalar first.
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Member:
+    """A strip of a network, as it is drawn.
+
+    Attributes
+    ----------
+    section : str
+        The name of its section.
+    length : float
+    place : tuple of float
+        Where it begins.
+    frame : tuple of float
+        The quaternion of its frame there.
+    strains : tuple of float
+        Curvature about the width, about the normal, and twist of the drawing; the state begins so.
+
+    Examples
+    --------
+    A quarter of a circle of radius 1 that begins upwards:
+
+    >>> quarter = Member("strip", math.pi / 2, strains=(1.0, 0.0, 0.0))
+    >>> quarter.drawn([0.0, math.pi / 2])[-1, 4:].round(12).tolist()
+    [0.0, -1.0, 1.0]
+    """
+
+    section: str = "strip"
+    length: float = 1.0
+    place: Vector = (0.0, 0.0, 0.0)
+    frame: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    strains: Vector = (0.0, 0.0, 0.0)
+
+    def drawn(self, s: Any) -> np.ndarray:
+        """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
+        own = natural_state.helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
+        q = np.array(product(self.frame, tuple(own[:, :4].T))).T
+        axes = np.array(directors(*self.frame)).reshape(3, 3)
+        return np.hstack([q, np.array(self.place) + own[:, 4:] @ axes])
+
+
+def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member:
+    """Return a straight member between two places, whose normal d2 is as near as possible to a direction.
+
+    Raises
+    ------
+    ValueError
+        The places are one, or the normal lies along the member.
+    """
+    along = np.array(end, dtype=float) - begin
+    length = float(np.linalg.norm(along))
+    if not 0 < length < math.inf:
+        raise ValueError(f"a member from {list(begin)} to {list(end)} has no direction")
+    tangent = along / length
+    across = np.array(ends.unit("normal", normal)) @ (np.eye(3) - np.outer(tangent, tangent))
+    if np.linalg.norm(across) < LOOSE:
+        raise ValueError(f"normal: {list(normal)} lies along the member from {list(begin)} to {list(end)}")
+    across /= np.linalg.norm(across)
+    frame = quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0]
+    return Member(section, length, tuple(map(float, begin)), tuple(map(float, frame)))
+
+
+@dataclass(frozen=True)
+class JointEnd:
+    """An end of a member at a joint.
+
+    Attributes
+    ----------
+    member : str
+    end : str
+        'start' or 'finish'.
+    angle : float or str
+        By which the member is turned at this joint, against the drawing; or the name of a number.
+    axis : tuple of float
+        About which, on the axes of the drawing.
+    arm : tuple of float
+        From the end to the joint, on the directors of the end.
+    """
+
+    member: str
+    end: str = START
+    angle: float | str = 0.0
+    axis: Vector = (1.0, 0.0, 0.0)
+    arm: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.end not in (START, FINISH):
+            raise ValueError(f"joint: end: {self.end!r} must be start or finish")
+        object.__setattr__(self, "axis", ends.unit("axis", self.axis))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of any number of ends.
+
+    Attributes
+    ----------
+    members : sequence of JointEnd
+    kind : str
+        'rigid', 'hinge' or 'ball'.
+    axis : tuple of float
+        Of a hinge, on the axes of the drawing; it turns with the first member.
+    """
+
+    members: Sequence[JointEnd]
+    kind: str = RIGID
+    axis: Vector = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.kind not in (RIGID, HINGE, BALL):
+            raise ValueError(f"joint: kind: {self.kind!r} must be rigid, hinge or ball")
+        if not self.members:
+            raise ValueError("joint: members: there must be one at least")
+
+
+@dataclass(frozen=True)
+class Load:
+    """Dead forces and moments with one number.
+
+    Attributes
+    ----------
+    forces : sequence of (joint, direction, arm)
+        The force at a joint is the number times the direction. ``arm`` is on the axes of the drawing, and fixed on the first
+        member of the joint.
+    moments : sequence of (joint, factor)
+        The moment about the axis of a hinge that holds a joint is the number times the factor.
+    """
+
+    forces: Sequence[tuple[str, Vector, Vector]] = ()
+    moments: Sequence[tuple[str, float]] = ()
+
+
+@dataclass
+class Network:
+    """Strips that meet at joints.
+
+    Attributes
+    ----------
+    sections : mapping of str to Section
+        With several of them, the numbers of each have its name behind theirs: ``kappa_n_beam``. Unit of length is any; the unit
+        of stiffness is a bending modulus, as in `ribbon_model.section`.
+    members : mapping of str to Member
+    joints : mapping of str to Joint
+        Ends that belong to no joint are free.
+    held : mapping of str to End
+        What is held at joints, on the axes of the drawing. The displacement of joint ``A`` is prescribed by the numbers
+        ``A_x1``, ``A_x2``, ``A_x3``, its rotation by ``A_turn``, ``A_bend``, ``A_swing``, as far as they are held.
+    loads : mapping of str to Load
+        By the name of the number.
+    numbers : mapping of str to float
+        Values of loads and prescribed numbers, and of angles that joints name; zero where nothing is given. ``weight``: per
+        length; ``pressure``: per length of a strip that bends in a plane; ``field``: couple per length.
+    weight_direction, pressure_normal, field_direction : tuple of float
+        Where the weight pulls to; the normal of the plane in which members go around an area, counterclockwise, on which the
+        pressure acts from outside; the direction of a uniform field.
+    magnetized : int
+        The number (0, 1, 2) of the director along which strips are magnetized.
+
+    Raises
+    ------
+    ValueError
+        One sentence.
+
+    Examples
+    --------
+    Two half circles, rigidly joined to a ring, buckle under a pressure of n**2 - 1 = 3 in their plane:
+
+    >>> import contin
+    >>> from ribbon_model.laws import ROD
+    >>> rod = Section(ROD, {"B1": 1.0, "B2": 50.0, "C": 50.0, "kappa_n": 1.0})
+    >>> half = Member("strip", math.pi, strains=(1.0, 0.0, 0.0))
+    >>> other = Member("strip", math.pi, tuple(half.drawn([math.pi])[0, 4:]), tuple(half.drawn([math.pi])[0, :4]), half.strains)
+    >>> joints = {"P": Joint([JointEnd("a", FINISH), JointEnd("b")]), "Q": Joint([JointEnd("b", FINISH), JointEnd("a")])}
+    >>> ring = Network({"strip": rod}, {"a": half, "b": other}, joints, numbers={"pressure": 0.0})
+    >>> circle, how = ring.first_point()
+    >>> branch = contin.trace(circle, free=["pressure"], limits={"pressure": (0, 4)})
+    >>> [(round(point["pressure"], 9), point.index_change) for point in branch.labelled("BP")]
+    [(3.0, (0, 2))]
+    """
+
+    sections: Mapping[str, Section]
+    members: Mapping[str, Member]
+    joints: Mapping[str, Joint] = field(default_factory=dict)
+    held: Mapping[str, End] = field(default_factory=dict)
+    loads: Mapping[str, Load] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    weight_direction: Vector = (0.0, -1.0, 0.0)
+    pressure_normal: Vector = (1.0, 0.0, 0.0)
+    field_direction: Vector = (0.0, 1.0, 0.0)
+    magnetized: int = 2
+
+    def __post_init__(self) -> None:
+        for name in ("weight_direction", "pressure_normal", "field_direction"):
+            setattr(self, name, ends.unit(name, getattr(self, name)))
+        self._check()
+        ends.check_known(self.numbers, self.known)
+
+    def _check(self) -> None:
+        """Raise ValueError for names of nothing, ends that are joined twice, and loads that a floating network cannot bear."""
+        for name, member in self.members.items():
+            _known(f"members: {name}: section", member.section, self.sections)
+            if not 0 < member.length < math.inf:
+                raise ValueError(f"members: {name}: length = {member.length:g} must be positive")
+        taken: set[tuple[str, str]] = set()
+        for name, joint in self.joints.items():
+            for each in joint.members:
+                _known(f"joints: {name}: member", each.member, self.members)
+                if (each.member, each.end) in taken:
+                    raise ValueError(f"joints: {name}: the {each.end} of {each.member} is joined twice")
+                taken.add((each.member, each.end))
+        for name in self.held:
+            _known("held", name, self.joints)
+        for number, load in self.loads.items():
+            for joint_name, *_ in load.forces:
+                _known(f"loads: {number}: joint", joint_name, self.joints)
+            for joint_name, _ in load.moments:
+                if joint_name not in self.held or self.held[joint_name].rotation != HINGED:
+                    raise ValueError(
+                        f"loads: {number}: moments: {joint_name} must be held by a hinge; elsewhere a dead moment has no energy"
+                    )
+        if self.floats:
+            if "weight" in self.numbers:
+                raise ValueError("weight: nothing is held, so nothing bears it; hold a joint")
+            for number, load in self.loads.items():
+                total = np.sum([direction for _, direction, _ in load.forces], axis=0)
+                if np.linalg.norm(total) > LOOSE:
+                    raise ValueError(f"loads: {number}: nothing is held, so its forces must add up to zero; hold a joint")
+
+    # --- names --------------------------------------------------------------------------------------------------------
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing is held."""
+        return not self.held
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of the numbers that can be given here, besides those of the sections."""
+        angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
+        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), "weight", "pressure", "field")
+
+    @property
+    def _prescribed(self) -> tuple[str, ...]:
+        """Names of the numbers that prescribe held joints."""
+        found: list[str] = []
+        for name, end in self.held.items():
+            found += [f"{name}_{x}" for x, *parts in zip(CENTRELINE, *end.held) if any(parts)]
+            found += [f"{name}_{angle}" for angle in ANGLES if end.rotation != FREE]
+        return tuple(found)
+
+    @functools.cached_property
+    def parameters(self) -> dict[str, float]:
+        """Names and values of all numbers that can be followed."""
+        potentials = [name for name in ("weight", "pressure", "field") if name in self.numbers]
+        always = [name for name in self.known if name not in ("weight", "pressure", "field")]
+        values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
+        own = {
+            self._full(name, number): value
+            for name, section in self.sections.items() for number, value in section.parameters.items()
+        }  # fmt: skip
+        return values | own | ({ASSEMBLY: 1.0} if self._is_open else {})
+
+    def _full(self, section: str, number: str) -> str:
+        """Return the name of a number of a section among all."""
+        return number if len(self.sections) == 1 else f"{number}_{section}"
+
+    # --- geometry of the drawing --------------------------------------------------------------------------------------
+
+    def _drawn(self, each: JointEnd) -> np.ndarray:
+        """Return quaternion and place (7,) of an end as it is drawn."""
+        member = self.members[each.member]
+        return member.drawn([0.0 if each.end == START else member.length])[0]
+
+    @functools.cached_property
+    def _gaps(self) -> dict[tuple[str, int], Vector]:
+        """Gaps of the drawing: from the first end of a joint to each of the others, where there are any."""
+        found = {}
+        for name, joint in self.joints.items():
+            places = [_at_arm(self._drawn(each), each.arm) for each in joint.members]
+            for number, place in enumerate(places):
+                if np.linalg.norm(place - places[0]) > LOOSE:
+                    found[name, number] = tuple(map(float, place - places[0]))
+        return found
+
+    @property
+    def _is_open(self) -> bool:
+        """Whether the drawing has gaps or turns that are to be closed."""
+        return bool(self._gaps) or any(each.angle != 0 for joint in self.joints.values() for each in joint.members)
+
+    # --- the problem --------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def problem(self) -> SegmentedVariationalProblem:
+        """The variational problem; its segments are the members, in their order.
+
+        Raises
+        ------
+        ProblemError
+            Conditions that repeat or contradict each other.
+        """
+        densities: dict[str, Callable] = {}
+        segments = []
+        for member in self.members.values():
+            key = member.section if self.sections[member.section].homogeneous else f"{member.section} {member.length}"
+            if key not in densities:
+                densities[key] = self._hamiltonian(member)
+            segments.append(VariationalSegment(None, (*FRAME, *CENTRELINE), member.length, hamiltonian=densities[key]))
+        return SegmentedVariationalProblem(segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy())
+
+    def _hamiltonian(self, member: Member) -> Callable:
+        section, length, name = self.sections[member.section], member.length, member.section
+        complementary, own = section.hamiltonian(), tuple(section.parameters)
+        numbers, full = namedtuple("Numbers", own), [self._full(name, number) for number in own]
+        homogeneous, potential = section.homogeneous, self._distributed()
+
+        def hamiltonian(s, x, lam, p):
+            q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
+            rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
+            M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
+            d = directors(*q)
+            value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*(getattr(p, each) for each in full)))
+            return value + n1 * d[6] + n2 * d[7] + n3 * d[8] - potential(x, d, p)
+
+        return hamiltonian
+
+    def _distributed(self) -> Callable:
+        """Return the potential per length of weight, pressure and field, as a function of (x, directors, p)."""
+        weight, pressure, couple = ("weight" in self.numbers, "pressure" in self.numbers, "field" in self.numbers)
+        down, normal, along, first = self.weight_direction, self.pressure_normal, self.field_direction, 3 * self.magnetized
+
+        def potential(x, d, p):
+            value = 0.0
+            if weight:
+                value = value - p.weight * (down[0] * x.x1 + down[1] * x.x2 + down[2] * x.x3)
+            if pressure:
+                swept = ends.cross((x.x1, x.x2, x.x3), d[6:9])
+                value = value + p.pressure * (normal[0] * swept[0] + normal[1] * swept[1] + normal[2] * swept[2]) / 2
+            if couple:
+                value = value - p.field * (along[0] * d[first] + along[1] * d[first + 1] + along[2] * d[first + 2])
+            return value
+
+        return potential
+
+    def _conditions(self) -> Callable:
+        """Return what vanishes at the ends."""
+        joints = list(self.joints.items())
+        held = [(name, *self._prescribing(name, end)) for name, end in self.held.items()]
+        floating = self._floating() if self.floats else None
+        gaps, readers = self._gaps, {name: self._reader(joint) for name, joint in self.joints.items()}
+
+        def conditions(a, b, p):
+            found = [x.q0 * x.q0 + x.q1 * x.q1 + x.q2 * x.q2 + x.q3 * x.q3 - 1 for x in a]
+            for name, joint in joints:
+                (first, origin), *others = readers[name](a, b, p)
+                for number, (frame, place) in enumerate(others, 1):
+                    gap = gaps.get((name, number))
+                    apart = [x - y for x, y in zip(place, origin)]
+                    found += apart if gap is None else [x - (1 - p.assembly) * y for x, y in zip(apart, gap)]
+                    found += _together(joint, first, frame)
+            for name, frame_of, place_of, rotation, position in held:
+                frame, place = readers[name](a, b, p)[0]
+                found += [*rotation(frame, frame_of(p)), *position(place, place_of(p))]
+            return found + (floating(a) if floating else [])
+
+        return conditions
+
+    def _reader(self, joint: Joint) -> Callable:
+        """Return ``read(a, b, p)``: joint frame and place of each end of a joint."""
+        order = list(self.members)
+        known = []
+        for each in joint.members:
+            q0 = self._drawn(each)[:4]
+            known.append((order.index(each.member), each, (float(q0[0]), *(-float(x) for x in q0[1:]))))
+
+        def read(a, b, p):
+            found = []
+            for number, each, back in known:
+                x = (a if each.end == START else b)[number]
+                frame = product(x[:4], back)
+                if each.angle != 0:
+                    half = p.assembly * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
+                    frame = product(frame, (math.cos(half), *(-math.sin(half) * part for part in each.axis)))
+                found.append((frame, _moved(x, each.arm)))
+            return found
+
+        return read
+
+    def _prescribing(self, name: str, end: End) -> tuple[Callable, Callable, Callable, Callable]:
+        """Return prescribed frame and place of a joint as functions of p, and the conditions for both."""
+        drawn = _at_arm(self._drawn(self.joints[name].members[0]), self.joints[name].members[0].arm)
+        along, angles = (tuple(f"{name}_{each}" for each in names) for names in (CENTRELINE, ANGLES))
+        numbers, turned = self._prescribed, end.rotation != FREE
+
+        def frame_of(p):
+            return ends.prescribed(*(getattr(p, angle) for angle in angles)) if turned else (1, 0, 0, 0)
+
+        def place_of(p):
+            return [float(x) + (getattr(p, each) if each in numbers else 0) for x, each in zip(drawn, along)]
+
+        return frame_of, place_of, ends.rotation_conditions(end), ends.place_conditions(end)
+
+    def _floating(self) -> Callable:
+        """Return the conditions that hold the rigid motions of a network that floats, at the first end of the first member."""
+        member = next(iter(self.members.values()))
+        drawn, axes = member.drawn([0.0])[0], self._free_turns
+        back = (float(drawn[0]), *(-float(x) for x in drawn[1:4]))
+
+        def conditions(a):
+            turned = product(a[0][:4], back)[1:]
+            found = [x - float(y) for x, y in zip(a[0][4:7], drawn[4:])]
+            return found + [sum(u * v for u, v in zip(axis, turned) if u != 0) for axis in axes]
+
+        return conditions
+
+    @property
+    def _free_turns(self) -> list[Vector]:
+        """Axes about which the whole network can turn without a change of the loads: all, one, or none.
+
+        A pressure belongs to the plane, in which the network stays: its tilt is held.
+        """
+        fixed = [direction for load in self.loads.values() for _, direction, _ in load.forces]
+        fixed += [self.field_direction] if "field" in self.numbers else []
+        if not fixed:
+            return [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+        first = ends.unit("direction", fixed[0])
+        parallel = all(np.linalg.norm(np.cross(first, ends.unit("direction", other))) < LOOSE for other in fixed)
+        return [first] if parallel else []
+
+    def _end_energy(self) -> Callable | None:
+        """Return the potential of dead forces and moments at joints, as a function of (a, b, p); None without one."""
+        if not self.loads:
+            return None
+        forces = []
+        for number, load in self.loads.items():
+            for name, direction, arm in load.forces:
+                first = self.joints[name].members[0]
+                back = np.array(directors(*self._drawn(first)[:4])).reshape(3, 3)
+                on_directors = tuple(map(float, np.array(first.arm) + back @ np.array(arm, dtype=float)))
+                forces.append(
+                    (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
+                )
+        turns = [
+            (
+                number,
+                factor,
+                self._reader(self.joints[name]),
+                ends.angle_of(end := self.held[name]),
+                self._prescribing(name, end)[0],
+            )
+            for number, load in self.loads.items()
+            for name, factor in load.moments
+        ]
+
+        def potential(a, b, p):
+            value = 0.0
+            for number, read, direction in forces:
+                place = read(a, b, p)[0][1]
+                value = value - getattr(p, number) * sum(u * x for u, x in zip(direction, place) if u != 0)
+            for number, factor, read, angle, frame_of in turns:
+                value = value - getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
+            return value
+
+        return potential
+
+    # --- first states -------------------------------------------------------------------------------------------------
+
+    def guess(self) -> list[Callable]:
+        """Return the drawing as a guess, one function of s for each member."""
+        return [functools.partial(_drawn_at, member) for member in self.members.values()]
+
+    def first_point(
+        self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options
+    ) -> tuple[Point, str]:
+        """Return a first state, and how it was found, in words.
+
+        Newton's method begins with the drawing, or with a guess. Where that fails, and the drawing has gaps or turns, these are
+        closed step by step.
+
+        Raises
+        ------
+        ProblemError
+            No state was found, or nothing determines it.
+        """
+        options = {"intervals": intervals, "degree": degree, **options}
+        guess = self.guess() if guess is None else guess
+        try:
+            return solve(self.problem, guess, values, **options), "from the drawing"
+        except ContinError as error:
+            if not self._is_open:
+                raise ProblemError(str(error)) from error
+        drawn = solve(self.problem, guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
+        closing = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False)
+        if abs(closing[-1][ASSEMBLY] - 1) > LOOSE:
+            raise ProblemError(
+                f"joints: the gaps and turns could not be closed; at {closing[-1][ASSEMBLY]:.3g} of the way: {closing.stop}"
+            )
+        return solve(self.problem, closing[-1]), "by closing the gaps and turns of the joints step by step"
+
+    # --- what a state is ----------------------------------------------------------------------------------------------
+
+    def strains(self, system: Collocation, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the strains (K, 3) of each member at the nodes of a discretized state."""
+        states, p = system.states(x), system.all_parameters(x)
+        rates = self.problem.batch("field").values(system.nodes, states, states[:0], p)
+        found = {}
+        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
+            at = list(piece.at[:4])
+            found[name] = strains_of(states[:, at], rates[:, at]) / member.length
+        return found
+
+    def shapes(self, point: Point) -> dict[str, Shape]:
+        """Return each member in space."""
+        strains, found = self.strains(point.system, point.x), {}
+        states = point.system.states(point.x)
+        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
+            found[name] = shape_of(member.length * point.system.nodes, states[:, list(piece.at)], strains[name])
+        return found
+
+    def reactions(self, point: Point) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return force and moment (3,) on the network at each joint that is held, on the axes of the drawing.
+
+        The moment is about the place of the joint. Of a network that floats, ``floating`` are those at the first end of the
+        first member: zero up to errors.
+        """
+        found = {}
+        for name in self.held:
+            joint = self.joints[name]
+            origin = _at_arm(self._state(point, joint.members[0])[:7], joint.members[0].arm)
+            force, moment = np.zeros(3), np.zeros(3)
+            for each in joint.members:
+                pull, couple, place = self._at_end(point, each)
+                force += pull
+                moment += couple + np.cross(place - origin, pull)
+            for number, load in self.loads.items():
+                for where, direction, arm in load.forces:
+                    if where == name:
+                        force -= point[number] * np.array(direction)
+                        moment -= np.cross(self._arm(point, joint.members[0], arm), point[number] * np.array(direction))
+                for where, factor in load.moments:
+                    if where == name:
+                        frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
+                        axes = np.array(directors(*frame)).reshape(3, 3)
+                        moment -= point[number] * factor * (np.array(self.held[name].axis) @ axes)
+            found[name] = force, moment
+        if self.floats:
+            ((name, _), *_) = self.members.items()
+            whole = JointEnd(name, START)
+            force, moment, place = self._at_end(point, whole)
+            for joint in self.joints.values():
+                if any((each.member, each.end) == (name, START) for each in joint.members):
+                    for each in joint.members:
+                        if (each.member, each.end) != (name, START):
+                            pull, couple, other = self._at_end(point, each)
+                            force, moment = force + pull, moment + couple + np.cross(other - place, pull)
+            found["floating"] = force, moment
+        return found
+
+    def _at_end(self, point: Point, each: JointEnd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return force and moment on a member at an end, and the place of that end."""
+        row = self._state(point, each)
+        sign = -1.0 if each.end == START else 1.0
+        return sign * row[11:14], sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
+
+    def _state(self, point: Point, each: JointEnd) -> np.ndarray:
+        """Return quaternion, place, and their multipliers (14,) at an end."""
+        number = list(self.members).index(each.member)
+        row: np.ndarray = point.system.states(point.x)[0 if each.end == START else -1, list(self.problem.pieces[number].at)]
+        return row
+
+    def _arm(self, point: Point, each: JointEnd, arm: Vector) -> np.ndarray:
+        """Return an arm on the axes of the drawing, fixed on an end, as it has turned."""
+        before, now = (np.array(directors(*q)).reshape(3, 3) for q in (self._drawn(each)[:4], self._state(point, each)[:4]))
+        turned: np.ndarray = (before @ np.array(arm, dtype=float)) @ now
+        return turned
+
+    def potential(self, point: Point) -> float:
+        """Return the energy with the potential of all loads: that of which the index is."""
+        loaded = self._end_energy()
+        if loaded is None:
+            return point["energy"]
+        states, rows = point.system.states(point.x), namedtuple("State", (*FRAME, *CENTRELINE))
+        first, last = ([rows(*states[end, list(piece.at[:7])]) for piece in self.problem.pieces] for end in (0, -1))
+        return point["energy"] + float(loaded(first, last, SimpleNamespace(**point.parameters)))
+
+
+def _known(what: str, name: str, names: Mapping) -> None:
+    """Raise ValueError for a name of nothing."""
+    if name not in names:
+        raise ValueError(f"{what}: {name!r} must be one of {', '.join(names) or 'none: there are none'}")
+
+
+def _together(joint: Joint, first, frame) -> list:
+    """Return what vanishes where two joint frames are together."""
+    if joint.kind == BALL:
+        return []
+    turned = ends.relative(frame, first)[1:]
+    if joint.kind == RIGID:
+        return list(turned)
+    pair = ends.perpendicular(ends.unit("axis", joint.axis))
+    return [sum(u * v for u, v in zip(vector, turned) if u != 0) for vector in pair]
+
+
+def _moved(x, arm: Vector) -> list:
+    """Return the place at the end of an arm that is fixed on the directors."""
+    d = directors(*x[:4]) if any(arm) else ()
+    return [x[4 + i] + sum(arm[j] * d[3 * j + i] for j in range(3) if arm[j] != 0) for i in range(3)]
+
+
+def _at_arm(state: np.ndarray, arm: Vector) -> np.ndarray:
+    return np.array(_moved(list(map(float, state)), arm))
+
+
+def _drawn_at(member: Member, s: float) -> np.ndarray:
+    return member.drawn([s])[0]
