@@ -109,9 +109,9 @@ def _zero(size: int) -> float:
 
 
 def _null_vectors(matrix: Array) -> Array:
-    """Return a basis of the v with matrix v = 0, as rows."""
+    """Return a basis of the v with matrix v = 0, as rows; there are as many rows as columns, or more."""
     balanced, columns = _balanced(matrix)
-    _, values, vectors = np.linalg.svd(balanced)
+    _, values, vectors = np.linalg.svd(np.linalg.qr(balanced, mode="r"))
     found: Array = vectors[values <= _zero(len(values)) * values[0]] / columns
     return found
 

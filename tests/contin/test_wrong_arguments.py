@@ -65,8 +65,8 @@ def calls(tmp_path_factory):
         "read_auto": (auto07p.read_auto, {"folder": folder}),
         "from_auto": (auto07p.from_auto, {"problem": PARABOLA, "solution": solution, "free": ["a"]}),
         "Event": (contin.Event, {"label": "UZ", "name": "one", "function": lambda trial: 1.0}),
-        "AlgebraicProblem": (contin.AlgebraicProblem, {"residual": field, **PLANE}),
-        "CycleProblem": (contin.CycleProblem, {"field": field, **PLANE}),
+        "AlgebraicProblem": (contin.AlgebraicProblem, {"residual": field, **PLANE, "mass": [1.0, 2.0]}),
+        "CycleProblem": (contin.CycleProblem, {"field": field, **PLANE, "mass": [1.0, 2.0]}),
         "MapProblem": (contin.MapProblem, {"map": field, **PLANE}),
         "ConnectionProblem": (contin.ConnectionProblem, {"field": field, **PLANE, "unstable": 1}),
         "BoundaryValueProblem": (contin.BoundaryValueProblem, {
@@ -89,7 +89,7 @@ def calls(tmp_path_factory):
         "Point.plot": (orbit.plot, {"what": "series"}), "Point.segment": (orbit.segment, {"index": 0}),
         "Point.sensitivities": (fold.sensitivities, {}), "Branch.plot": (branch.plot, {}),
         "Branch.labelled": (branch.labelled, {"label": "LP"}), "Branch.column": (branch.column, {"name": "a"}),
-        "Diagram.plot": (found.plot, {}),
+        "Diagram.plot": (found.plot, {}), "PhaseResponse.plot": (orbit.phase_response().plot, {"states": ["x"]}),
     }  # fmt: skip
 
 

@@ -124,3 +124,25 @@ def test_doubled_cycles_of_a_map():
     k = 3.3
     places = sorted((1 + k + sign * math.sqrt((k - 3) * (k + 1))) / (2 * k) for sign in (-1, 1))
     assert sorted(double[-1].system.states(double[-1].x).ravel()) == pytest.approx(places, abs=1e-10)
+
+
+@pytest.mark.parametrize("b, way", [(-0.5, 1), (0.5, -1)])
+def test_the_direction_is_that_of_the_normal_form(b, way):
+    """r' = r (m + b r^2 - r^4): cycles with m = r^4 - b r^2 on both sides of the generalized Hopf point at b = 0."""
+
+    def bautin(u, p):
+        growth = p.m + p.b * (u.x**2 + u.y**2) - (u.x**2 + u.y**2) ** 2
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    problem = contin.AlgebraicProblem(bautin, ["x", "y"], {"m": -1.0, "b": b})
+    (hopf,) = contin.trace(contin.solve(problem, [0, 0]), free=["m"], limits={"m": (-2, 2)}).labelled("HB")
+    curve = contin.curve(hopf, free=["m", "b"], direction=way, limits={"b": (-1, 1)})
+    assert curve.labelled("GH")
+    for point in curve:
+        cycles = contin.trace(point, branch=1, limits={"max_x": (-1, 0.3)})
+        assert cycles[0].label == "HB" and len(cycles) > 2
+        for cycle in cycles[1:]:
+            square = cycle["max_x"] ** 2
+            assert cycle["m"] == pytest.approx(square**2 - point["b"] * square, abs=1e-9)
+        if point.label != "GH":
+            assert np.sign(cycles[1]["m"]) == -np.sign(point["lyapunov"])
