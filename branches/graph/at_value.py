@@ -12,12 +12,12 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.interpolation import uncertainty
-from branches.scene.errors import ROUND_OFF
+from branches.scene.errors import errors_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.read import read_branch
-from contin import ContinError, Settings
-from contin.lowlevel import Collocation, Continuation, correct
+from contin import ContinError, ConvergenceError, Settings
+from contin.lowlevel import Collocation, Continuation, correct, point_of
 from ribbon_model import exact
 from ribbon_model.shape import interpolated
 
@@ -158,21 +158,17 @@ def _same(state: State, near: State, others: list[dict]) -> bool:
 def solved(system: Collocation, x: np.ndarray) -> tuple[dict[str, float], dict[str, float]]:
     """Return kappa_star and energy of the state near a guess, at the kappa_n of the system, and their errors.
 
-    The state is corrected, then corrected again on a mesh with every interval halved. The error is the difference of both, and
-    what Newton's method left.
-
     Raises
     ------
     ConvergenceError
+        There is no state, on this mesh or with every interval halved.
     """
-    coarse = correct(system, x)
-    fine, carry = system.refined()
-    corrected = correct(fine, carry(coarse.x))
-    names = system.problem.functionals
-    before, after = (dict(zip(names, map(float, s.functionals(c.x)))) for s, c in ((system, coarse), (fine, corrected)))
-    left = corrected.error + ROUND_OFF
-    errors = {name: float(abs(after[name] - before[name]) + left * (1 + abs(after[name]))) for name in _COLUMNS}
-    return {name: after[name] for name in _COLUMNS}, errors
+    found = correct(system, x)
+    point = point_of(system, found.x, found.iterations, found.error)
+    errors = errors_of(point, lambda at: {name: at[name] for name in _COLUMNS})
+    if any(map(math.isnan, errors.values())):
+        raise ConvergenceError("the state was not found with every interval of the mesh halved")
+    return {name: point[name] for name in _COLUMNS}, errors
 
 
 def _guess(branch: StoredBranch, arclength: float, kappa_n: float) -> tuple[Collocation, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Errors of what is found at labelled points, which are located again on a mesh twice as fine."""
+"""Errors of what is found at points, which are located again on a mesh twice as fine."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from contin import Point
 from contin.lowlevel import error, point_of
 
 #: An error is given as no less than this part of the largest value of its kind: 16 units in the last place.
-ROUND_OFF = 16 * float(np.finfo(float).eps)
+_ROUND_OFF = 16 * float(np.finfo(float).eps)
 
 Found = Callable[[Point], Mapping[str, float]]
 
 
 def errors_of(point: Point, found: Found) -> dict[str, float]:
-    """Return the estimated errors of what is found at a labelled point, by name; NaN where it is not located again.
+    """Return the estimated errors of what is found at a point, by name; NaN where it is not found again.
 
     To what contin says of a number (`contin.Point.error`) round-off of the largest force or moment is added, which the others
     were computed with.
@@ -30,7 +30,7 @@ def errors_of(point: Point, found: Found) -> dict[str, float]:
     largest: dict[str, float] = {}
     for name, value in here.items():
         largest[_kind(name)] = max(largest.get(_kind(name), 0.0), abs(value))
-    left = point.newton_error + ROUND_OFF
+    left = point.newton_error + _ROUND_OFF
     return {name: float(one + left * largest[_kind(name)]) for name, one in zip(here, errors)}
 
 
