@@ -8,6 +8,7 @@ import numpy as np
 
 from branches.explore.packing import column, compressed
 from branches.explore.profiles import marked
+from branches.explore.snaps import states_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import OPEN
@@ -46,7 +47,9 @@ def gathered(files: list[Path], title: str) -> dict:
 
 def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) -> dict:
     rows = np.flatnonzero(branch.points["stage"] == number)
-    values = np.array([_states(branch, int(row)) for row in rows])
+    at = np.linspace(0, 1, _NODES)
+    values = states_of(branch.sampled(int(row), at)[0] for row in rows)
+    values[..., -3:] *= 2 * np.pi  # the length of closed strips
     labels = [branch.points["label"][row].decode() for row in rows]
     names = {int(event["point"]): event["name"].decode() for event in branch.events}
     kept, last = [*columns, "arclength", "index"], number == branch.points["stage"][-1]
@@ -57,12 +60,3 @@ def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) ->
         "columns": {name: column(branch.points[name][rows]) for name in kept}, "components": [],
         "shapes": compressed(values),
     }  # fmt: skip
-
-
-def _states(branch: StoredBranch, row: int) -> np.ndarray:
-    """Return quaternion, eta and centreline (_NODES, 8) at equidistant places; the length is 2 pi, as that of closed strips."""
-    t, states = branch.states_at(row)
-    shape = branch.shape(row)
-    at = np.linspace(0, 1, _NODES)
-    table = np.column_stack([states[:, :4], shape.eta, 2 * np.pi * states[:, 4:7]])
-    return np.array([np.interp(at, t, column) for column in table.T]).T

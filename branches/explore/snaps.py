@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -49,14 +50,15 @@ def _film(descent: Descent) -> dict:
     """Return columns and shapes of strips at equal distances along the way, each turned so that it moves least."""
     strips = list(dict.fromkeys(descent.frames(_FRAMES)))
     shapes = steady({number: strip.shape(_STATIONS).placed(2 * math.pi) for number, strip in enumerate(strips)})
-    values = np.array([_states(shape) for shape in shapes.values()])
-    for before, here in zip(values, values[1:]):  # a quaternion and its negative are the same frame
-        here[:, :4] *= math.copysign(1, np.vdot(before[:, :4], here[:, :4]))
+    values = states_of(shapes.values())
     columns = {"arclength": np.arange(len(strips)), "kappa_n": descent.end.kappa_n, "energy": [one.energy for one in strips]}
     packed = {name: column(np.broadcast_to(numbers, len(strips)).astype(float)) for name, numbers in columns.items()}
     return {"columns": packed, "shapes": compressed(values)}
 
 
-def _states(shape: Shape) -> np.ndarray:
-    """Return the states at the stations, shape (_STATIONS, len(branches.explore.strips.CHANNELS))."""
-    return np.column_stack([quaternions(shape.directors), shape.eta, shape.centreline])
+def states_of(shapes: Iterable[Shape]) -> np.ndarray:
+    """Return the states of shapes at their nodes, shape (shapes, nodes, len(branches.explore.strips.CHANNELS))."""
+    values = np.array([np.column_stack([quaternions(shape.directors), shape.eta, shape.centreline]) for shape in shapes])
+    for before, here in zip(values, values[1:]):  # a quaternion and its negative are the same frame
+        here[:, :4] *= math.copysign(1, np.vdot(before[:, :4], here[:, :4]))
+    return values

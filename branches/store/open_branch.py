@@ -52,6 +52,10 @@ class OpenBranch(StoredBranch):
         """Return the strip at a kept point, of length 1, on the axes of its first end."""
         return self._shape(point, *self.states_at(point))[0]
 
+    def sampled(self, point: int, t: np.ndarray) -> tuple[Shape, np.ndarray]:
+        """Return `shape` and strains (K, 3) at places t (K,), from the polynomials of the solution."""
+        return self._shape(point, t, interpolated(*self.states_at(point), self.degree(point), t))
+
     def _shape(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
         """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
         material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
@@ -73,13 +77,10 @@ class OpenBranch(StoredBranch):
         The axes are tangent, width and normal of its first end, or the weight points downwards. Between the nodes of the
         solution, its polynomials are evaluated at further places until there are at least as many ``cells``.
         """
-        t, states = self.states_at(point)
-        pieces = -(-cells // (len(t) - 1))
-        if pieces > 1:
-            nodes, parts = t, np.arange(pieces) / pieces
-            t = np.append((t[:-1, None] + np.diff(t)[:, None] * parts).ravel(), t[-1])
-            states = interpolated(nodes, states, self.degree(point), t)
-        shape, strains = self._shape(point, t, states)
+        nodes = self.states_at(point)[0]
+        parts = np.arange(pieces := max(1, -(-cells // (len(nodes) - 1)))) / pieces
+        t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
+        shape, strains = self.sampled(point, t)
         shape = standing(shape, self.up)
         middle = shape.centreline.mean(axis=0)
         return replace(

@@ -555,6 +555,17 @@ EXACT = [(law, nu, None) for law in ("ribbon", "flat rod", "isotropic rod") for 
 EXACT += [("finite width", 0.3, 8.0)]
 
 
+def test_shapes_of_open_strips_are_those_of_their_polynomials(tmp_path):
+    """Centrelines within the error of the compression, on the coarsest mesh that resolves the arc; its length is 2 pi."""
+    text = "material: {law: flat rod, nu: 0.3, kappa_n: 2}\nfinish: free\nstages: [{follow: kappa_n, to: 3}]\n"
+    scene = parse(text + "mesh: {intervals: 2, max_intervals: 2, tolerance: 1.0e-4}\n", "scene")
+    run_scene(scene, tmp_path / "arc.h5", Display(silent=True))
+    (family,) = gather([str(tmp_path / "arc.h5")])["families"]
+    places, s = decoded(family["branches"][0])[-1, :, -3:], np.linspace(0, 1, 97)
+    arc = 2 * np.pi * np.column_stack([0 * s, np.cos(3 * s) - 1, np.sin(3 * s)]) / 3  # bends about the width
+    assert np.abs(np.abs(places) - np.abs(arc)).max() < 2 * TOLERANCE * np.abs(arc).max()
+
+
 @needs_chromium
 @pytest.mark.full
 def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
