@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import contin
+
 PROJECT = Path(__file__).resolve().parent.parent
 #: Pages that other tests run.
-RUN_ELSEWHERE = {"file-format", "from-auto", "from-xppaut"}
+RUN_ELSEWHERE = {"file-format", "from-auto", "from-xppaut", "large"}
 PAGES = [
     page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem not in RUN_ELSEWHERE
 ]
@@ -69,6 +71,23 @@ def test_blocks_run(page, project):
         for line in block.replace("\\\n", " ").splitlines():
             if line.startswith(PROGRAM) and not ELSEWHERE.search(line):  # the others are what it prints
                 _run(shlex.split(line.removeprefix(PROGRAM), comments=True))
+
+
+@pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
+def test_the_page_of_finite_elements_runs():
+    pytest.importorskip("skfem", reason="scikit-fem is not installed (pip install scikit-fem)")
+    scope = {}
+    for block in re.findall(r"^```python\n(.*?)^```", (PROJECT / "docs/large.md").read_text(encoding="utf-8"), re.M | re.S):
+        exec(compile(block, "docs/large.md", "exec"), scope)
+    assert 14 < (error_of_the_fold(scope, 8) / error_of_the_fold(scope, 16)) < 18
+
+
+def error_of_the_fold(scope, side):
+    """Error of the fold on a mesh of 2 side^2 triangles, of fourth order."""
+    problem = scope["bratu"](side)
+    start = contin.solve(problem, np.zeros(len(problem.states)))
+    branch = contin.trace(start, free=["lam"], limits={"lam": (0, 7)}, max_points=14)
+    return branch.labelled("LP")[0]["lam"] - 6.80812442259
 
 
 def _run(words):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contin.core.settings import Settings
-from contin.core.trial import Event, Trial
+from contin.core.trial import Event, Trial, same_sign
 from contin.events.arc import Arc
 from contin.events.index import contradiction
 from contin.events.inspection import Inspection, Start
@@ -86,6 +86,6 @@ class Judge:
         end = trial.settled
         if end is trial:
             return ""
-        same = end.sign == trial.sign and self._sense(end) * self._sense(trial) >= 0
+        same = same_sign(end.sign, trial.sign) and self._sense(end) * self._sense(trial) >= 0
         same = same and all(np.sign(trial.value(test)) == np.sign(end.value(test)) for test in self._general)
         return "" if same else "a special point moves out of the step with the places where conditions on states switch"

@@ -95,7 +95,8 @@ def scaled(
         counting = first.counting(small, held, sizes) if small else small
         held |= {name: 0.0 for name in small if name not in counting}
     alike: Mapping[str, str] = getattr(problem, "alike", {})
-    sizes = np.array([stated.get(name, sizes[names.index(alike.get(name, name))]) for name in names])
+    known = dict(zip(names, sizes))
+    sizes = np.array([stated.get(name, known[alike.get(name, name)]) for name in names])
     of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
     found = usual(sizes[: len(states)]), usual(np.array([of_parameters[name] for name in problem.parameters]))
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)

@@ -79,8 +79,7 @@ class Trial:
         newton_error: float = 0.0,
     ) -> None:
         self.system, self.x = system, x
-        #: The same point on a mesh with points where conditions on states switch (`contin.core.settling`).
-        self.settled = self
+        self._settled: Trial | None = None  # not itself: a cycle of references would keep its factors until they are collected
         self.iterations, self.newton_error = iterations, newton_error
         self._linear: Linearization | None = None if callable(linear) else linear
         self._linearize = linear if callable(linear) else None
@@ -91,6 +90,15 @@ class Trial:
     def __repr__(self) -> str:
         values = [f"{name}={self[name]:.6g}" for name in self.system.free]
         return f"Trial({', '.join([*values, f'of {self.system!r}'])})"
+
+    @property
+    def settled(self) -> Trial:
+        """The same point on a mesh with points where conditions on states switch (`contin.core.settling`)."""
+        return self._settled or self
+
+    @settled.setter
+    def settled(self, trial: Trial) -> None:
+        self._settled = trial if trial is not self else None
 
     @classmethod
     def without_tangent(cls, system: Discretization, x: Array) -> Trial:
@@ -250,6 +258,11 @@ class Event:
         True
         """
         return after >= 0 if self.limit else sign_changed(before, after)
+
+
+def same_sign(before: float, after: float) -> bool:
+    """Return whether two signs of determinants are equal, or nothing is known of both: a solver may not say them."""
+    return before == after or (math.isnan(before) and math.isnan(after))
 
 
 def sign_changed(before: float, after: float) -> bool:

@@ -159,7 +159,9 @@ class AlgebraicEquations(System):
         from scipy.sparse import csr_array, hstack, vstack
 
         beside = hstack([jacobian, csr_array(columns.T)]) if len(columns) else jacobian
-        return residual, SparseFactors(vstack([beside, csr_array(rows)]) if len(rows) else beside, len(rows))
+        return residual, SparseFactors(
+            vstack([beside, csr_array(rows)]) if len(rows) else beside, len(rows), self.problem.solver
+        )
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
@@ -263,7 +265,9 @@ class AlgebraicEquations(System):
         This is the notion of stability of the kind of problem: whatever asks for eigenvalues asks this.
         """
         if self.is_sparse:
-            return [(found, found) for found in (rightmost(self.as_field().field_jacobian(x)) for x in places)]
+            return [
+                (found, found) for found in (rightmost(self.as_field().field_jacobian(x), self.problem.solver) for x in places)
+            ]
         matrices = np.array([self.jacobian(x) for x in places])
         finite = np.isfinite(matrices).all()
         found = eigenvalues(matrices) if finite else np.array([eigenvalues(matrix) for matrix in matrices])

@@ -28,6 +28,9 @@ from contin.problems.vector_field import returning
 #: A rate below this part of the terms it may consist of is zero: solutions are known to 1e-12, and their rates, too.
 _AT_REST = 1e-8
 
+#: Most states, with a sparse matrix of some GB: a bound so that a slip of the keyboard is a sentence and not a full memory.
+_MOST_STATES = 1_000_000
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlgebraicProblem(Restated):
@@ -62,6 +65,13 @@ class AlgebraicProblem(Restated):
     mass : matrix, or sequence of float, optional
         The constant matrix M of M u' = F(u, p), or its diagonal. A state whose column is zero has no rate: it is a column,
         found from the equations without rates, which must determine it (an index of one), from the value of the guess on.
+    solver : callable, optional
+        ``solver(matrix)`` factors a square sparse matrix of SciPy (CSC) and returns an object with ``solve(b, trans)``: b of
+        the shape (n,) or (n, k), trans "N" or "T" (transposed). It raises RuntimeError where the matrix is singular. By
+        default ``scipy.sparse.linalg.splu``. It is used for all solves where the matrix is kept sparse (from 200 states on),
+        with border rows and columns in the matrix; complex shifts of eigenvalues stay with SuperLU. An attribute ``sign`` is
+        the sign of the determinant; without it, and without factors like those of SuperLU, branch points are counted by solves
+        alone.
 
     Raises
     ------
@@ -85,11 +95,12 @@ class AlgebraicProblem(Restated):
     pattern: Any = None
     angles: Any = ()
     mass: Any = None
+    solver: Function | None = None
     #: There is no t.
     domain: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        self._keep(states=check_statement(self.states, self.parameters, self.functionals))
+        self._keep(states=check_statement(self.states, self.parameters, self.functionals, _MOST_STATES))
         checks.truth("dynamics", self.dynamics)
         if self.count is not None:
             checks.whole("count", self.count, 1, MOST_CONDITIONS)
@@ -99,6 +110,8 @@ class AlgebraicProblem(Restated):
             raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")
         if self.jacobian is not None and argument_count(checks.function("jacobian", self.jacobian)) != 2:
             raise ProblemError("jacobian must take 2 arguments, (u, p)")
+        if self.solver is not None:
+            checks.function("solver", self.solver)
         if self.pattern is not None:
             what = "pattern= has no effect any more, and will go: entries are found by recording, or give jacobian="
             warn(what, DeprecationWarning)

@@ -14,7 +14,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
 from contin.core.protocol import inner
-from contin.core.trial import Trial, sign_changed
+from contin.core.trial import Trial, same_sign, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import locate_branch_point
@@ -62,14 +62,15 @@ class BranchPointSearch:
         """How many branch points the step passes, and whether that is clear."""
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         row, size = state.row, state.system.size
-        if before.sign == trial.sign and state.system.cannot_branch(self.arc):
+        same = same_sign(before.sign, trial.sign)
+        if same and state.system.cannot_branch(self.arc):
             return 0, True
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and calm(before.factors, trial.factors, size):
+        if same and calm(before.factors, trial.factors, size):
             return 0, True
         watched = is_watched(before.factors, trial.factors, size)
-        if watched and not self.sign_changes:
+        if watched and not self._sign_changes:
             along = quotients_along(functools.cache(self._whole))
             if along is not None and crossings(along) == (0, True):
                 return 0, True
@@ -81,7 +82,7 @@ class BranchPointSearch:
         count, clear = crossings(values)
         if (count > 1 or not clear) and self._without_smallest is not None:
             return self._without_smallest
-        return count, clear and (count % 2 == 1) == self.sign_changes
+        return count, clear and (not self._says_sign or (count % 2 == 1) == self._sign_changes)
 
     @functools.cached_property
     def _without_smallest(self) -> tuple[int, bool] | None:
@@ -111,16 +112,17 @@ class BranchPointSearch:
         matrix = functools.cache(lambda part: self._bordered(part, rows, column))
         first, last = matrix(0.0), matrix(1.0)
         g = [factors.solve(unit)[-1] for factors in (first, last)]
-        if not np.isfinite(g).all() or (g[0] * g[1] < 0) != self.sign_changes:
+        changes = bool(g[0] * g[1] < 0)
+        if not np.isfinite(g).all() or (self._says_sign and changes != self._sign_changes):
             return None
         values = quotients_along(matrix, _PIVOT)
         if values is None:
             values = quotients(first, last, size + 1)
         if not np.isfinite(values).all():
             return 0, False
-        if crossings(values) != (0, True) or first.sign != last.sign:
+        if crossings(values) != (0, True) or not same_sign(first.sign, last.sign):
             return None
-        if self.sign_changes:
+        if changes:
             self._shares = _shares(np.array([g[0] / g[1]]))
             return 1, True
         if matrix(0.5).solve(unit)[-1] * g[0] > 0:
@@ -148,9 +150,28 @@ class BranchPointSearch:
         return _GAP if self.arc.state.system.intervals else _GAP_WITHOUT_MESH
 
     @property
-    def sign_changes(self) -> bool:
-        """The determinant's sign changes inside the step."""
+    def _says_sign(self) -> bool:
+        """The signs of the determinants are known: all factorizations but those of some users' solvers say it."""
+        return not (np.isnan(self.arc.before.sign) and np.isnan(self.arc.trial.sign))
+
+    @property
+    def _sign_changes(self) -> bool:
+        """The determinant's sign is known, and changes inside the step."""
         return sign_changed(self.arc.before.sign, self.arc.trial.sign)
+
+    @property
+    def sign_changes(self) -> bool:
+        """The determinant's sign changes inside the step; where it is not known, an odd number of singular values passes."""
+        return self._sign_changes if self._says_sign else self.count[0] % 2 == 1
+
+    def _changes_up_to(self, there: Trial) -> bool:
+        """Return whether the determinant's sign changes between the start of the step and a place inside it."""
+        before, row = self.arc.before, self.arc.state.row
+        if self._says_sign:
+            return there.sign != before.sign
+        for trial in (before, there):
+            trial.refactor(row)
+        return crossings(quotients(before.factors, there.factors, self.arc.state.system.size))[0] % 2 == 1
 
     @functools.cached_property
     def simple(self) -> SpecialPoint:
@@ -170,10 +191,10 @@ class BranchPointSearch:
             except ConvergenceError:
                 pass
             try:
-                sign = arc.at(middle).sign
+                changes = self._changes_up_to(arc.at(middle))
             except ConvergenceError:
                 break
-            low, high = (middle, high) if sign == arc.before.sign else (low, middle)
+            low, high = (low, middle) if changes else (middle, high)
             middle = (low + high) / 2
         return SpecialPoint(high, Label.BRANCH_POINT, "", trial, is_located=False)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
-from contin.core.trial import Event
+from contin.core.trial import Event, same_sign
 from contin.events.folds import may_turn
 from contin.events.inspection import Inspection
 from contin.events.trivial import crossed
@@ -58,7 +58,7 @@ def _determinant(counts: bool) -> Entry:
 
     def asks(inspection: Inspection) -> bool:
         before, trial = inspection.arc.before, inspection.arc.trial
-        return before.sign != trial.sign or (counts and inspection.branch_points.count != (0, True))
+        return not same_sign(before.sign, trial.sign) or (counts and inspection.branch_points.count != (0, True))
 
     return asks
 

@@ -10,7 +10,9 @@ from contin.arrays import Array
 class Factors(Protocol):
     """A factored square matrix J: solves with it and with its transpose, for one right-hand side or for several as rows."""
 
-    sign: float
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant."""
 
     def solve(self, b: Array) -> Array:
         """Return the x with J x = b."""

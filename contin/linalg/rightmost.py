@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import ComplexArray
+from contin.arrays import ComplexArray, Function
 
 #: Eigenvalues that each operator gives at first, dimension of the Krylov space for each, restarts, tolerance. Those that
 #: converge late are not wanted: without a bound on restarts, a reaction-diffusion problem takes a hundred times as long.
@@ -20,7 +20,7 @@ _STRIP = 0.2
 _SAME = 1e-7
 
 
-def rightmost(matrix: Any) -> ComplexArray:
+def rightmost(matrix: Any, solver: Function | None = None) -> ComplexArray:
     """Return the eigenvalues of a real sparse matrix that lie right of the imaginary axis or near to it, by Arnoldi's method.
 
     The Cayley transform (A - s)^-1 (A + s + 2 d) with s, d > 0 has the eigenvalues (z + s + 2 d) / (z - s): larger than one
@@ -30,6 +30,8 @@ def rightmost(matrix: Any) -> ComplexArray:
     Parameters
     ----------
     matrix : scipy.sparse array, shape (n, n)
+    solver : callable, optional
+        Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
 
     Returns
     -------
@@ -45,20 +47,22 @@ def rightmost(matrix: Any) -> ComplexArray:
     [(0.5+3j), (0.5-3j)]
     """
     from scipy.sparse import csc_array, eye_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
+    from scipy.sparse.linalg import splu  # type: ignore[import-untyped]
 
+    factor = solver or splu
     matrix = csc_array(matrix, dtype=float)
     if not np.isfinite(matrix.data).all():
         return np.full(2, np.nan, dtype=complex)
     one = eye_array(matrix.shape[0], format="csc")
     size = float(abs(matrix).sum(axis=0).max())
-    found = [_transformed(matrix, one, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
+    found = [_transformed(factor, matrix, one, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
     scale = float(np.abs(found[0]).max(initial=0.0)) or 1.0
     for share in _SHIFTS:
         shift, count = min(share * scale, size), _COUNT
-        found.append(_transformed(matrix, one, shift, (1 + 2 * _STRIP) * shift))
+        found.append(_transformed(factor, matrix, one, shift, (1 + 2 * _STRIP) * shift))
         while np.all(found[-1].real > 0) and found[-1].size and 2 * count < matrix.shape[0]:  # there may be more
             count *= 2
-            found.append(_transformed(matrix, one, shift, (1 + 2 * _STRIP) * shift, count))
+            found.append(_transformed(factor, matrix, one, shift, (1 + 2 * _STRIP) * shift, count))
     return _distinct(np.concatenate(found))
 
 
@@ -72,7 +76,7 @@ def nearest(matrix: Any, value: complex) -> complex:
     (7+0j)
     """
     from scipy.sparse import csc_array, eye_array
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu  # type: ignore[import-untyped]
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
     n = matrix.shape[0]
     shifted = csc_array(matrix, dtype=complex) - complex(value) * eye_array(n, format="csc")
@@ -91,16 +95,16 @@ def nearest(matrix: Any, value: complex) -> complex:
     return complex(value + 1 / found[0])
 
 
-def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
+def _transformed(factor: Function, matrix: Any, one: Any, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
     """Return the eigenvalues z of largest |(z + zero) / (z - pole)|, or of largest 1 / |z - pole| without a zero."""
-    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, splu
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
     n = matrix.shape[0]
     try:
-        factors, after = splu(matrix - pole * one), matrix + zero * one
+        factors, after = factor(matrix - pole * one), matrix + zero * one
     except RuntimeError:  # exactly singular
         return np.empty(0, dtype=complex)
-    operator = LinearOperator((n, n), (lambda v: factors.solve(after @ v)) if zero else factors.solve, dtype=float)
+    operator = LinearOperator((n, n), lambda v: factors.solve(after @ v if zero else v, "N"), dtype=float)
     start = np.random.default_rng(11).standard_normal(n)
     options = {"ncv": min(_SPACE * count, n), "maxiter": _RESTARTS, "tol": _TOLERANCE, "return_eigenvectors": False}
     try:

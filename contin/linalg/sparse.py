@@ -1,12 +1,14 @@
-"""LU factorization of a sparse matrix, by SuperLU."""
+"""Factorization of a sparse matrix, by SuperLU or by a solver of the user."""
 
 from __future__ import annotations
 
+import contextlib
+import functools
 from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, Indices
+from contin.arrays import Array, Function, Indices
 
 #: Border rows are scaled to this part of the matrix: one becomes a pivot only where all other entries are smaller. Otherwise
 #: they would become pivots anywhere, and fill the factors. Pivots that small lose nine digits; refinement gives them back.
@@ -21,6 +23,8 @@ class SparseFactors:
     matrix : scipy.sparse array, shape (n, n)
     borders : int
         So many rows at the end are dense.
+    solver : callable, optional
+        Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
 
     Raises
     ------
@@ -38,7 +42,7 @@ class SparseFactors:
     def __repr__(self) -> str:
         return f"{type(self).__name__}(sign of the determinant {self.sign:g})"
 
-    def __init__(self, matrix: Any, borders: int = 0) -> None:
+    def __init__(self, matrix: Any, borders: int = 0, solver: Function | None = None) -> None:
         from scipy.sparse.linalg import splu  # type: ignore[import-untyped]  # .1 s; only large problems need it
 
         if matrix.shape[0] != matrix.shape[1]:
@@ -50,18 +54,25 @@ class SparseFactors:
             rows = abs(matrix.tocsr())
             self._scale[-borders:] = _BORDER * (rows[:-borders].max() or 1.0) / (rows[-borders:].max() or 1.0)
         self._matrix.data *= self._scale[self._matrix.indices]
-        #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite.
-        self.sign = np.nan
-        if np.isfinite(matrix.data).all():
-            try:
-                self._lu = splu(self._matrix)
-            except RuntimeError:  # a pivot is exactly zero
-                self.sign = 0.0
-            else:
-                self.sign = self._sign()
+        self._is_finite = bool(np.isfinite(matrix.data).all())
+        if self._is_finite:
+            with contextlib.suppress(RuntimeError):  # a pivot is exactly zero
+                self._lu = (solver or splu)(self._matrix)
 
-    def _sign(self) -> float:
-        negative = np.count_nonzero(self._lu.U.diagonal() < 0) + _odd(self._lu.perm_r) + _odd(self._lu.perm_c)
+    @functools.cached_property
+    def sign(self) -> float:
+        """Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite, or the solver does not say it.
+
+        It takes a copy of SuperLU's factors, so it is computed when it is first asked for.
+        """
+        lu = self._lu
+        if lu is None:
+            return 0.0 if self._is_finite else np.nan
+        if hasattr(lu, "sign"):
+            return float(lu.sign)
+        if not (hasattr(lu, "perm_r") and hasattr(lu, "perm_c") and hasattr(lu, "U")):
+            return np.nan
+        negative = np.count_nonzero(lu.U.diagonal() < 0) + _odd(lu.perm_r) + _odd(lu.perm_c)
         return -1.0 if negative % 2 else 1.0
 
     def solve(self, b: Array) -> Array:

@@ -247,20 +247,20 @@ def phases_of(problem: Statement) -> tuple[str, ...]:
 
 
 def check_statement(
-    states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function]
+    states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function], most: int = _MOST_STATES
 ) -> tuple[str, ...]:
-    """Check names and values of a problem, and return the names of its states (u0, u1, ... for a number of states).
+    """Check names and values of a problem, and return the names of its states (u0, u1, ... for a number of states, ``most``).
 
     Raises
     ------
     ProblemError
     """
     if isinstance(states, (int, np.integer)):
-        checks.whole("states", states, 1, _MOST_STATES)
+        checks.whole("states", states, 1, most)
         states = [f"u{i}" for i in range(states)]
     names = _usable("states", states)
-    if not 1 <= len(names) <= _MOST_STATES:
-        raise ProblemError(f"states: there must be at least one, and at most {_MOST_STATES}")
+    if not 1 <= len(names) <= most:
+        raise ProblemError(f"states: there must be at least one, and at most {most}")
     _usable("parameters", tuple(checks.mapping("parameters", parameters, "numbers")))
     _usable("functionals", [*checks.mapping("functionals", functionals, "functions"), *parameters])
     for name, value in parameters.items():
