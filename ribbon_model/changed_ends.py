@@ -93,7 +93,7 @@ def corrected(strip: OpenStrip, near: Collocation, states: np.ndarray, values: M
         There is none nearby.
     """
     multipliers = strip.problem.multipliers
-    values = _fitted(strip, states, dict(values), multipliers)[0]
+    values = fitted(strip, states, dict(values), multipliers)[0]
     system = Collocation(strip.problem, near.mesh, near.degree, multipliers, values)
     return point_of(system, correct(system, system.pack(states, values)).x)
 
@@ -106,7 +106,7 @@ def _balanced(strip: OpenStrip, states: np.ndarray, values: dict[str, float]) ->
     ValueError
     """
     problem, names = strip.problem, [name for name in (*FORCES, "moment") if name in strip.numbers]
-    values, left = _fitted(strip, states, values, [*names, *problem.multipliers])
+    values, left = fitted(strip, states, values, [*names, *problem.multipliers])
     conditions = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
     if left[:conditions].max(initial=0.0) > _HOLDS:
         raise ValueError("they hold a place or a rotation that the state does not have (the first end has moved or turned)")
@@ -115,7 +115,7 @@ def _balanced(strip: OpenStrip, states: np.ndarray, values: dict[str, float]) ->
     return values
 
 
-def _fitted(strip: OpenStrip, states: np.ndarray, values: dict[str, float], unknown) -> tuple[dict[str, float], np.ndarray]:
+def fitted(strip: OpenStrip, states: np.ndarray, values: dict[str, float], unknown) -> tuple[dict[str, float], np.ndarray]:
     """Return the values with those of the unknown numbers that fit the conditions at the ends best, and what is left."""
     problem, order = strip.problem, list(strip.problem.parameters)
     p = np.array([values.get(name, problem.parameters[name]) for name in order])

@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 from branches.explore.packing import column, compressed
 from branches.explore.snaps import way_down
-from branches.explore.solutions import solutions
+from branches.explore.solutions import filled, solutions
 from branches.scene.closed import ClosedScene, and_nu, law_of
 from branches.scene.labels import ON_PAGE, kind_of
 from branches.store.branch import StoredBranch
@@ -24,8 +24,10 @@ from branches.store.layout import CLOSED
 from branches.store.read import read_kind
 from ribbon_model import exact
 from ribbon_model.domains import DOMAINS
+from ribbon_model.equilibrium import strains_of
 from ribbon_model.laws import FINITE_WIDTH, LAWS, PAPER_LAWS
 from ribbon_model.linear import circle, covering, energy_interval, index
+from ribbon_model.shape import shape_of
 from ribbon_model.solution import Solution
 
 #: What is kept of a shape at each node, in this order.
@@ -151,27 +153,17 @@ def shapes(branch: StoredBranch) -> np.ndarray:
     domain = DOMAINS[branch.config["domain"]]
     t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / domain.parts(branch.config["n"]))) + 1)
     problem = domain.problem(LAWS[branch.config["law"]])
-    found = solutions(branch)
-    known = [number for number, solution in enumerate(found) if solution is not None]
-    values = np.array([_channels(problem, found[number], t) for number in known])
-    if len(known) == len(found):
-        return values
-    s = branch.points["arclength"]
-    place = np.interp(s, s[known], np.arange(len(known)))
-    low = np.minimum(place.astype(int), len(known) - 2)
-    part = (place - low)[:, None, None]
-    return (1 - part) * values[low] + part * values[low + 1]
+    found = [(number, Solution.at(*one)) for number, one in enumerate(solutions(branch)) if one is not None]
+    values = np.array([_channels(problem, solution, t) for _, solution in found])
+    return filled(branch, [number for number, _ in found], values)
 
 
 def _channels(problem, solution: Solution, t: np.ndarray) -> np.ndarray:
     """Return the states of one solution at t, shape (K, len(CHANNELS))."""
     states, size, none = solution.sampled(t), len(problem.states), np.empty((0, len(problem.states)))
     parameters = np.array([solution.parameters[name] for name in problem.parameters])
-    q0, q1, q2, q3 = states[:, :4].T
-    p0, p1, p2, p3 = problem.batch("field").values(t, np.ascontiguousarray(states[:, :size]), none, parameters)[:, :4].T
-    omega_1 = q0 * p1 - q1 * p0 - q2 * p3 + q3 * p2  # times length / 2: `spin` of the equations, inverted
-    omega_3 = q0 * p3 - q3 * p0 - q1 * p2 + q2 * p1
-    eta = np.divide(omega_3, omega_1, out=np.zeros_like(t), where=omega_1 != 0)
+    rates = problem.batch("field").values(t, np.ascontiguousarray(states[:, :size]), none, parameters)
+    eta = shape_of(t, states, strains_of(states[:, :4], rates[:, :4])).eta
     return np.column_stack([states[:, :4], eta, states[:, 4:]])
 
 

@@ -17,7 +17,7 @@ from branches.run.progress import Progress
 from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point
-from contin.lowlevel import Collocation, exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.barriers import KICK_OPEN, Barrier, apart, barriers, ways_down
 from ribbon_model.changed_ends import corrected
 from ribbon_model.descent import descend
@@ -108,31 +108,17 @@ def _between(branch: OpenBranch, pair, part: float, row: int) -> State | None:
     kept = set(branch.kept().tolist())
     if not kept >= set(map(int, pair)):
         return None
-    near, far = (_stored(branch, strip, int(one)) for one in (pair if part < 0.5 else pair[::-1]))
+    (near, x), (far, beyond) = (branch.discretized(int(one)) for one in (pair if part < 0.5 else pair[::-1]))
     weight = part if part < 0.5 else 1 - part
-    states = (1 - weight) * near.system.states(near.x) + weight * far.system.evaluate(far.x, near.system.nodes)
+    states = (1 - weight) * near.states(x) + weight * far.evaluate(beyond, near.nodes)
     values = {name: float(branch.points[name][row]) for name in strip.parameters}
     try:
-        point = corrected(strip, near.system, states, values)
+        point = corrected(strip, near, states, values)
         index = point.second_variation().index()
     except ContinError:
         return None
     number = int(pair[0] if part < 0.5 else pair[1])
     return State(f"point {number}", strip, point, index, strip.potential(point))
-
-
-@dataclass(frozen=True, eq=False)
-class _Stored:
-    system: Collocation
-    x: np.ndarray
-
-
-def _stored(branch: OpenBranch, strip: OpenStrip, number: int) -> _Stored:
-    """Return a kept point on its mesh; its multipliers of conditions are not in the file, and are zero."""
-    t, states = branch.states_at(number)
-    degree = int(branch.index["degree"][branch.index["point"] == number][0])
-    system = Collocation(strip.problem, t[::degree], degree, strip.problem.multipliers, strip.parameters)
-    return _Stored(system, system.pack(states, dict.fromkeys(strip.problem.multipliers, 0.0)))
 
 
 def _same(one: State, other: State) -> bool:

@@ -23,6 +23,7 @@ from branches.store.files import StoreError
 
 if TYPE_CHECKING:  # the mechanics of a kind of strip are imported with its stages
     from branches.scene.stage import Stage
+    from contin.lowlevel import Collocation
     from ribbon_model.shape import Shape
 
 #: So many labelled points are shown at a prompt, a line each: a screen has 24 lines.
@@ -236,6 +237,10 @@ class StoredBranch(ABC):
     @abstractmethod
     def solution(self, point: int) -> Any:
         """Return the solution of a kept point of a closed strip; see `states_at` for its errors."""
+
+    @abstractmethod
+    def discretized(self, point: int) -> tuple[Collocation, np.ndarray]:
+        """Return the system on the mesh of a kept solution, and its unknowns (system.size,)."""
 
     @abstractmethod
     def shape(self, point: int) -> Shape:

@@ -15,6 +15,7 @@ from branches.draw.style import NU, colour_of, in_words
 from branches.scene.closed import and_nu
 from branches.scene.labels import kind_of, label_of
 from branches.store.branch import Mark, StoredBranch
+from contin.lowlevel import Collocation
 from ribbon_model.domains import DOMAINS, LOOP
 from ribbon_model.laws import LAWS
 from ribbon_model.shape import Shape
@@ -47,6 +48,9 @@ class ClosedBranch(StoredBranch):
         names = [name for name in domain.problem(law).parameters if name in self.points.dtype.names]
         parameters = {name: float(self.points[point][name]) for name in names}
         return Solution(law, domain, t, states, self.degree(point), parameters)
+
+    def discretized(self, point: int) -> tuple[Collocation, np.ndarray]:
+        return self.solution(point).discretized()
 
     def shape(self, point: int) -> Shape:
         return self.solution(point).shape()

@@ -14,7 +14,8 @@ from branches.draw.strip import ROOM, SIDE, View
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
-from contin.lowlevel import PALETTE
+from contin.lowlevel import PALETTE, Collocation
+from ribbon_model.changed_ends import fitted
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
@@ -50,13 +51,18 @@ class OpenBranch(StoredBranch):
 
     def shape(self, point: int) -> Shape:
         """Return the strip at a kept point, of length 1, on the axes of its first end."""
-        return self._shape(point, *self.states_at(point))[0]
+        return self.shape_at(point, *self.states_at(point))[0]
 
-    def sampled(self, point: int, t: np.ndarray) -> tuple[Shape, np.ndarray]:
-        """Return `shape` and strains (K, 3) at places t (K,), from the polynomials of the solution."""
-        return self._shape(point, t, interpolated(*self.states_at(point), self.degree(point), t))
+    def discretized(self, point: int) -> tuple[Collocation, np.ndarray]:
+        """As `StoredBranch.discretized`; the multipliers of conditions, which are not in the file, are those that fit best."""
+        t, states = self.states_at(point)
+        strip, degree = self._strip(point), self.degree(point)
+        numbers, _ = fitted(strip, states, self._numbers(point), strip.problem.multipliers)
+        free = (self.followed(int(self.points["stage"][point])), *strip.problem.multipliers)
+        system = Collocation(strip.problem, t[::degree], degree, free, numbers)
+        return system, system.pack(states, numbers)
 
-    def _shape(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
+    def shape_at(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
         """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
         material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
         strains = self._strains(point, t, states)
@@ -80,7 +86,7 @@ class OpenBranch(StoredBranch):
         nodes = self.states_at(point)[0]
         parts = np.arange(pieces := max(1, -(-cells // (len(nodes) - 1)))) / pieces
         t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
-        shape, strains = self.sampled(point, t)
+        shape, strains = self.shape_at(point, t, interpolated(*self.states_at(point), self.degree(point), t))
         shape = standing(shape, self.up)
         middle = shape.centreline.mean(axis=0)
         return replace(
