@@ -21,7 +21,7 @@ import contin
 
 PROJECT = Path(__file__).resolve().parent.parent
 #: Pages that other tests run.
-RUN_ELSEWHERE = {"file-format", "from-auto", "from-xppaut", "large"}
+RUN_ELSEWHERE = {"file-format", "from-auto", "from-xppaut", "from-sbml", "large"}
 PAGES = [
     page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem not in RUN_ELSEWHERE
 ]
@@ -76,10 +76,21 @@ def test_blocks_run(page, project):
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_the_page_of_finite_elements_runs():
     pytest.importorskip("skfem", reason="scikit-fem is not installed (pip install scikit-fem)")
-    scope = {}
-    for block in re.findall(r"^```python\n(.*?)^```", (PROJECT / "docs/large.md").read_text(encoding="utf-8"), re.M | re.S):
-        exec(compile(block, "docs/large.md", "exec"), scope)
+    scope = python_of("large.md")
     assert 14 < (error_of_the_fold(scope, 8) / error_of_the_fold(scope, 16)) < 18
+
+
+def test_the_page_of_sbml_runs():
+    pytest.importorskip("libsbml", reason="libSBML is not installed (pip install python-libsbml)")
+    assert "evaluated in Python" not in python_of("from-sbml.md")["problem"].describe()
+
+
+def python_of(page):
+    """Run the Python of a page, and return its names."""
+    scope = {}
+    for block in re.findall(r"^```python\n(.*?)^```", (PROJECT / "docs" / page).read_text(encoding="utf-8"), re.M | re.S):
+        exec(compile(block, page, "exec"), scope)
+    return scope
 
 
 def error_of_the_fold(scope, side):
