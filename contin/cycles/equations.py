@@ -167,7 +167,7 @@ class PeriodicEquations(Collocation):
         return tuple(self.problem.means)
 
     def functionals(self, x: Array) -> Array:
-        """Return the largest and smallest values of each state, and the means of the user's functionals.
+        """Return the largest and smallest values of each state, and of those that follow, and the means of functionals.
 
         An angle that rotates takes all values: the largest is half a period, the smallest minus that.
         """
@@ -177,7 +177,20 @@ class PeriodicEquations(Collocation):
         found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
         means = super().functionals(x) if self.problem.means else np.empty(0)
-        return np.concatenate([found.ravel(), own, means])
+        return np.concatenate([found.ravel(), self._extremes_of_following(x), own, means])
+
+    def following(self, x: Array, times: Array) -> Array:
+        """Return the states that follow from others at ``times`` (m,), shape (m, their number)."""
+        at = [self.integrated.index(name) for name in self.problem.following]
+        return self.integrands(x, times % 1.0, self.evaluate_scaled(x, times))[:, at]
+
+    def _extremes_of_following(self, x: Array) -> Array:
+        """Return the largest and smallest values of the polynomials through the states that follow, at the nodes."""
+        if not self.problem.following:
+            return np.empty(0)
+        values = np.ascontiguousarray(self.following(x, self.nodes))
+        found: Array = extremes(self.degree, self.mesh, values.ravel(), values.shape[1])
+        return found.ravel()
 
     def _whole(self, x: Array) -> tuple[Array, Array]:
         """Return the mesh and the values at the nodes over the whole orbit, on the unit interval."""

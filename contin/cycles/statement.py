@@ -75,7 +75,7 @@ class CycleProblem(BoundaryValueProblem):
         States in which the field is periodic, with the period 2 pi or, in a mapping, any other. Functionals should be periodic
         in them, too: the mean of another one depends on where the round begins.
     mass : matrix, or sequence of float, optional
-        As for an `AlgebraicProblem`, of M u' = F. Of states without rates the mean is a column.
+        As for an `AlgebraicProblem`, of M u' = F. Of states without rates the mean is a column, too.
 
     Raises
     ------
@@ -204,8 +204,11 @@ class CycleProblem(BoundaryValueProblem):
         """
         found = _STATED.get(problem)
         if found is None:
-            given = problem.residual, problem.state_names, problem.parameters
-            found = cls(*given, functionals=problem.functionals, angles=problem.angles)
+            given = problem.residual, problem.state_names, problem.parameters, problem.functionals
+            if problem.following:
+                found = FollowedProblem(*given, problem.following, angles=problem.angles)
+            else:
+                found = cls(*given[:3], functionals=problem.functionals, angles=problem.angles)
             _STATED[problem] = found
         return found
 
@@ -226,7 +229,7 @@ class CycleProblem(BoundaryValueProblem):
         >>> def oscillator(u, p):
         ...     return u.v, -p.k * u.x - u.drag, u.drag + u.drag**3 - u.v
         >>> CycleProblem(oscillator, ["x", "v", "drag"], {"k": 4.0}, mass=[1, 1, 0]).without_found([0.0])
-        CycleProblem(states x, v; parameters k, period)
+        FollowedProblem(states x, v; parameters k, period)
         """
         arguments, names, mass = 2 if self.period is None else 3, self.state_names, self.mass
         own = (PERIOD, ROUNDS, *winding_names(self.angles))
@@ -244,7 +247,8 @@ class CycleProblem(BoundaryValueProblem):
         kept = [names[i] for i in mass.kept]
         angles = {name: period for name, period in self.angles.items() if name in kept}
         rates = of_kept(mass.rates_of(self.field, arguments))
-        return CycleProblem(rates, kept, parameters, functionals=means, period=self.period, angles=angles)
+        following = [names[i] for i in mass.found]
+        return FollowedProblem(rates, kept, parameters, means, following, period=self.period, angles=angles)
 
     def check_index(self, states: Array, parameters: Mapping[str, float]) -> None:
         """Check that the equations without rates determine the states that have none, at a place.
@@ -364,6 +368,29 @@ def _at_time(field: Function, names: Sequence[str]) -> Function:
     """Return a forced field as one whose time is a parameter."""
     known: Any = namedtuple("P", names)  # type: ignore[misc]  # noqa: PYI024
     return lambda u, p: field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in names)))
+
+
+class FollowedProblem(CycleProblem):
+    """Cycles with functionals that are states which follow from others; their extremes are columns, as those of states.
+
+    Parameters
+    ----------
+    field, states, parameters, functionals, period, angles
+        As of a `CycleProblem`.
+    following : sequence of str
+        Names of these functionals.
+    """
+
+    def __init__(
+        self, field: Function, states: Sequence[str], parameters: Mapping[str, float], functionals: Mapping[str, Function],
+        following: Sequence[str], *, period: Period | None = None, angles: Angles = (),
+    ) -> None:  # fmt: skip
+        super().__init__(field, states, parameters, functionals=functionals, period=period, angles=angles)
+        extremes = [f"{kind}_{name}" for name in following for kind in ("max", "min")]
+        count, columns = 2 * len(states), list(self.functionals)
+        columns[count:count] = extremes
+        functions = {**self.functionals, **dict.fromkeys(extremes, found_elsewhere)}
+        self._keep(following=tuple(following), functionals={name: functions[name] for name in columns})
 
 
 def _with_mass(field: Function, mass: Any, names: Sequence[str], forced: bool) -> tuple[Function, Mass | None]:

@@ -280,6 +280,7 @@ class KeptProblem(AlgebraicProblem):
         kept = [names[i] for i in mass.kept]
         angles = {name: period for name, period in whole.angles.items() if name in kept}
         rates = of_kept(mass.rates_of(whole.residual, 2))
+        self._keep(following=tuple(names[i] for i in mass.found))
         super().__init__(rates, kept, whole.parameters, functionals, angles=angles)
 
 
@@ -298,7 +299,7 @@ class ReducedProblem(AlgebraicProblem):
     kept : list of int
         Places of the states that are kept.
     total_names, following : tuple of str
-        Names of the parameters, and of the states that follow.
+        Names of the parameters, and of the states that follow from them, in the same order; then of others that follow.
     """
 
     whole: AlgebraicProblem
@@ -318,11 +319,11 @@ class ReducedProblem(AlgebraicProblem):
         follow = np.zeros((len(names), len(names)))  # the states, of those that are kept and the totals
         follow[kept, np.arange(len(kept))] = 1.0
         follow[pivots, : len(kept)], follow[pivots, len(kept) :] = -totals[:, kept], np.eye(len(totals))
-        following = tuple(names[i] for i in pivots)
+        following = (*(names[i] for i in pivots), *whole.following)
         self._keep(whole=whole, totals=totals, kept=kept, total_names=total_names, following=following, _follow=follow)
         of_whole = functools.partial(_of_whole, names, follow.tolist(), total_names)
         functionals = {name: of_whole(function) for name, function in whole.functionals.items()}
-        functionals |= {name: of_whole(_state(name)) for name in self.following}
+        functionals |= {names[i]: of_whole(_state(names[i])) for i in pivots}
         rates, parameters = returning(whole.residual, whole._signature), dict.fromkeys(total_names, 0.0)
         super().__init__(
             of_whole(rates, kept), [names[i] for i in kept], {**whole.parameters, **parameters}, functionals,
@@ -353,7 +354,7 @@ class ReducedProblem(AlgebraicProblem):
         system = self.whole.discretized((), dict(zip(self.whole.parameters, map(float, p))))
         rates, matrix = system.residual(states), system.jacobian(states)
         noise = _AT_REST * np.abs(matrix) @ (1 + np.abs(states))
-        for total, state in zip(self.totals, self.following):
+        for total, state in zip(self.totals, self.following):  # first those of the totals
             place = self.whole.state_names.index(state)
             if not abs(rates[place]) <= noise[place]:
                 what = f"{written(total, self.whole.state_names)} is conserved elsewhere, and not at the solution"
@@ -368,7 +369,7 @@ class ReducedProblem(AlgebraicProblem):
     def conserved(self) -> str:
         """What is conserved: a sentence."""
         texts = checks.listed(written(total, self.whole.state_names) for total in self.totals)
-        names, states = checks.listed(self.total_names), checks.listed(self.following)
+        names, states = checks.listed(self.total_names), checks.listed(self.following[: len(self.totals)])
         if len(self.totals) == 1:
             return f"{texts} is conserved: the parameter {names} is its value, and {states} follows from the other states"
         return f"{texts} are conserved: the parameters {names} are their values, and {states} follow from the other states"

@@ -75,6 +75,8 @@ class Restated:
     dynamics = False
     #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
     spare: str | None = None
+    #: Functionals that are states which follow from others: their largest and smallest values over a cycle are columns, too.
+    following: tuple[str, ...] = ()
     #: A singular mass matrix.
     mass: Any = None
     #: The problem with conserved totals as parameters; None where nothing is conserved.

@@ -80,7 +80,7 @@ def _known(system: Collocation) -> tuple[str, ...]:
     """Return the names of the states; of segments each name once, in order."""
     problem = system.problem
     if not declared(problem, "pieces"):
-        return tuple(problem.state_names)
+        return (*problem.state_names, *(declared(problem, "following") if system.is_cycle else ()))
     return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
 
 
@@ -107,10 +107,15 @@ def _course(point: Record, names: Sequence[str]) -> tuple[Array, Array]:
     cycle = system.is_cycle
     once = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
     t = np.unique(np.arange(system.order)[:, None] + once) if cycle else once
-    which = [system.problem.state_names.index(name) for name in names]
-    states = system.evaluate(point.x, t)[:, which]
-    t = t * system.unit_time(point.x) if cycle else t
-    return _on_circles(t, states, (periods_of(system.problem) * (system.gains[-1] != 0))[which]) if cycle else (t, states)
+    which = [_known(system).index(name) for name in names]
+    states = system.evaluate(point.x, t)
+    if not cycle:
+        return t, states[:, which]
+    rotating = periods_of(system.problem) * (system.gains[-1] != 0)
+    if declared(system.problem, "following"):
+        following = system.following(point.x, t)
+        states, rotating = np.hstack([states, following]), np.append(rotating, np.zeros(following.shape[1]))
+    return _on_circles(t * system.unit_time(point.x), states[:, which], rotating[which])
 
 
 def _on_circles(t: Array, states: Array, periods: Array) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 import scipy.sparse
+from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
 import contin
@@ -111,6 +112,10 @@ def test_a_cascade_oscillates(tmp_path):
         # half a second between the samples costs the square of half of it, times the second rate
         assert orbit["max_EPP"] == pytest.approx(late[7].max(), rel=1e-5)
         assert orbit["min_KP"] == pytest.approx(late[1].min(), rel=1e-5)
+        assert orbit["max_M"] == pytest.approx(late[2].max(), rel=1e-5)  # of states that follow, too
+        assert orbit["min_E"] == pytest.approx(late[5].min(), rel=1e-4)  # absolute 2e-5
+    axes = settled.plot("series", states=["KP", "M"], axes=Figure().subplots())
+    assert [line.get_label() for line in axes.lines] == ["KP", "M"]
     assert cycles[-1]["period"] == pytest.approx(settled["period"], rel=1e-8)
     contin.save(cycles, tmp_path / "cycles.npz")
     read = contin.load(contin.CycleProblem(cascade, NAMES, {"v": 2.5}), tmp_path / "cycles.npz")

@@ -138,6 +138,7 @@ def test_a_forced_one():
                            functionals={"power": lambda t, u, p: u.v**2})  # fmt: skip
     point = contin.solve(problem, [0.0, 1.0])
     assert "recorded" in point.system.problem.describe().partition("\n")[0]
+    assert point["max_v"] == pytest.approx(math.sqrt(0.5), abs=1e-9)
     assert point["max_x"] == pytest.approx(math.sqrt(0.5), abs=1e-9) and point["power"] == pytest.approx(0.25, abs=1e-9)
 
 
