@@ -80,6 +80,11 @@ def calls(tmp_path_factory):
         "VariationalProblem": (contin.VariationalProblem, {
             "energy": lambda t, x, w, p: w.y**2, "states": ["y"], "parameters": {"q": 1.0}, "ends": lambda a, b, p: (a.y, b.y),
         }),
+        "VariationalSegment": (contin.VariationalSegment, {"energy": lambda s, x, w, p: w.y**2, "states": ["y"]}),
+        "SegmentedVariationalProblem": (contin.SegmentedVariationalProblem, {
+            "segments": [contin.VariationalSegment(lambda s, x, w, p: w.y**2, ["y"])], "parameters": {"q": 1.0},
+            "ends": lambda a, b, p: (a[0].y, b[0].y),
+        }),
         "Search": (contin.Search, {"values": [1.0]}),
         "Settings": (contin.Settings, {}), "MeshControl": (contin.MeshControl, {}), "Newton": (contin.Newton, {}),
         "gradient": (lowlevel.gradient, {"function": lambda x: x**2, "by": ["x"]}),
