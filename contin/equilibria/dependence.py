@@ -77,6 +77,8 @@ def conservation_laws(problem: Any) -> Array:
                 return none
             columns += [matrix, rates[:, None]]
     vectors = _null_vectors(np.hstack(columns).T) if len(columns) >= 2 * _PLACES else none
+    if len(vectors) == n:
+        return none  # nothing moves
     forms = [_reduced(vectors), _reduced(vectors[:, ::-1])[:, ::-1]]
     fewest: Array = min(forms, key=lambda form: np.count_nonzero(form < 0))
     found: Array = np.where(np.abs(fewest - np.rint(fewest)) < _LEAST, np.rint(fewest), fewest)

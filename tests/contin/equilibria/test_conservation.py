@@ -3,6 +3,7 @@
 import math
 import pickle
 from collections import namedtuple
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -120,6 +121,55 @@ def test_a_cascade_oscillates(tmp_path):
     contin.save(cycles, tmp_path / "cycles.npz")
     read = contin.load(contin.CycleProblem(cascade, NAMES, {"v": 2.5}), tmp_path / "cycles.npz")
     assert read[-1]["max_EPP"] == cycles[-1]["max_EPP"]
+
+
+def exact_rank(rows):
+    """The rank of a matrix of fractions."""
+    rows, rank = [list(row) for row in rows], 0
+    for column in range(len(rows[0])):
+        pivot = next((i for i in range(rank, len(rows)) if rows[i][column]), None)
+        if pivot is None:
+            continue
+        rows[rank], rows[pivot] = rows[pivot], rows[rank]
+        for i in range(rank + 1, len(rows)):
+            factor = rows[i][column] / rows[rank][column]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[rank])]
+        rank += 1
+    return rank
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_networks(seed):
+    """As many totals as states less the rank of the rates, which is exact, with constants between 1e-3 and 1e3.
+
+    Reactions of the same substances count together: A -> B and A -> C conserve a combination of B and C.
+    """
+    random = np.random.default_rng(seed)
+    n, count = int(random.integers(3, 10)), int(random.integers(2, 14))
+    taken, made = (np.zeros((count, n), dtype=int) for _ in range(2))
+    for side in (taken, made):
+        for r in range(count):
+            np.add.at(side[r], random.integers(n, size=random.integers(1, 3)), 1)
+    constants = (10.0 ** random.uniform(-3, 3, count)).tolist()
+
+    def rates(u, p):
+        speeds = [p.s * k * math.prod(u[i] for i in range(n) for _ in range(row[i])) for k, row in zip(constants, taken)]
+        change = made - taken
+        return [sum((int(change[r, i]) * speeds[r] for r in range(count) if change[r, i]), 0.0 * u[0]) for i in range(n)]
+
+    kinds = sorted({tuple(row) for row in taken})
+    exact = [[int(change) * Fraction(k) for change in row] for k, row in zip(constants, made - taken)]
+    alike = [[row for row, substances in zip(exact, taken) if tuple(substances) == kind] for kind in kinds]
+    terms = [[sum((row[i] for row in rows), Fraction()) for rows in alike] for i in range(n)]
+    expected = n - exact_rank(terms)
+    reduced = AlgebraicProblem(rates, n, {"s": 1.0}).reduced
+    if expected == n:
+        assert reduced is None  # nothing moves
+        return
+    assert (0 if reduced is None else len(reduced.totals)) == expected
+    if reduced is not None:
+        matrix = np.array(terms, dtype=float)
+        assert np.all(np.abs(reduced.totals @ matrix) <= 1e-9 * (np.abs(reduced.totals) @ np.abs(matrix)))
 
 
 def test_it_is_stored_and_pickled(tmp_path):
