@@ -45,8 +45,10 @@ INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
 _LOOP_NODES, _FEWEST = 384, 16
 #: Circles reach a little farther in kappa_n than the branches do, so that they are there at the outermost fold (ten times more
-#: would leave a fifth of the map to them), in so many steps. (On a circle all columns are parabolas: the page makes it finer.)
-_BEYOND, _CIRCLE_STEPS = 0.02, 6
+#: would leave a fifth of the map to them).
+_BEYOND = 0.02
+#: Steps of a circle. All columns of laws that the page knows are parabolas there, which the page makes finer; others are not.
+_CIRCLE_STEPS, _CURVED_STEPS = 6, 60
 
 
 def branch_of(path: Path, slow: bool = True) -> dict:
@@ -176,7 +178,8 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
         neutral += [m * end for end in energy_interval(material, m, parameters) if ends[0] < m * end < ends[1]]
-    kappa_n = np.unique(np.round(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral), 9))
+    steps = _CIRCLE_STEPS if material.name in _ON_PAGE else _CURVED_STEPS
+    kappa_n = np.unique(np.round(np.append(np.linspace(*ends, steps + 1), neutral), 9))
     kappa_n = np.sort(np.append(kappa_n, (kappa_n[1:] + kappa_n[:-1]) / 2))  # one between any two neutral ones
     values = [circle(material, m, k, parameters) for k in kappa_n]
     columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, parameters, neutral) for k in kappa_n]}

@@ -35,6 +35,8 @@ _STEP, _MOST_PARTS = 0.05, 200
 _SAME_PLACE = 1e-3
 #: Widths of branches in a diagram, by whether they are stable; None: not known.
 _WIDTHS = {True: 3.4, False: 1.4, None: 1.4}
+#: Places of a circle at which kappa* is computed; it is no straight line if the law is not linear.
+_ALONG = 200
 #: How circles are drawn.
 _CIRCLES: dict[str, dict] = {
     "unstable": {"color": UNSTABLE, "lw": 0.9, "ls": LINES[False][0]},
@@ -226,9 +228,8 @@ def _empty(axes, found: list[Line], blob: list[Mark]) -> tuple[float, float, flo
     """The place of an inset, as parts of the panel: of the largest size for which there is one, the nearest to the blob."""
     to_panel = axes.transData + axes.transAxes.inverted()
     points = np.concatenate([np.column_stack([line.kappa_n, line.kappa_star]) for line in found])
-    sizes = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"]  # stable circles are in the way, too
-    ends = [np.linspace(a, b, 200) for a, b in (xy for xy in sizes if len(xy) == 2)]
-    points = to_panel.transform(np.concatenate([points, *ends]))
+    solid = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"]  # stable circles are in the way, too
+    points = to_panel.transform(np.concatenate([points, *solid]))
     here = to_panel.transform([(blob[0].kappa_n, blob[0].kappa_star)])[0]
     for width, height in _INSETS:
         corners = np.stack(np.meshgrid(np.arange(_NUMBERS[0], 0.98 - width, _SEARCH),
@@ -335,9 +336,9 @@ def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> No
     material, parameters = law_of(law, nu)
 
     def plot(m, ends, **style):
-        ends = np.clip(ends, *window)
-        height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in ends]
-        axes.plot(ends, height, zorder=1, **style)
+        along = np.linspace(*np.clip(ends, *window), _ALONG)
+        height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in along]
+        axes.plot(along, height, zorder=1, **style)
 
     for m in _coverings(graph, law, nu):
         plot(m, window, **_CIRCLES["unstable"])

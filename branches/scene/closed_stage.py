@@ -14,7 +14,7 @@ from branches.scene.advice import no_state
 from branches.scene.closed import ClosedScene
 from branches.scene.columns import FOUND, NUMBER, Column, Columns, error_of
 from branches.scene.errors import errors_of
-from branches.scene.fields import ConfigError
+from branches.scene.fields import ConfigError, StepConfig
 from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
@@ -288,9 +288,7 @@ def _leave_primary(scene: ClosedScene):
 def _at_origin(scene: ClosedScene):
     """Return the point of the primary branch."""
     origin = scene.origin
-    primary = ClosedScene(
-        law=scene.law, nu=scene.nu, Gamma=scene.Gamma, parameters=scene.parameters, m=scene.m, n=scene.n, mesh=scene.mesh
-    )  # fmt: skip
+    primary = scene.model_copy(update={"origin": None, "domain": CELL.name, "steps": StepConfig()})
     reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
     primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
     system, x, tangent = seed(primary)

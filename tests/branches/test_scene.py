@@ -8,20 +8,24 @@ import signal
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import contin
 from branches.explore.gather import gather
 from branches.graph.kinds import graph_kind
 from branches.graph.parts import add
-from branches.graph.stored import new_graph, save
+from branches.graph.picture import circles
+from branches.graph.stored import new_graph, read, save
 from branches.run.display import Display
 from branches.run.many import run_many
+from branches.run.progress import Progress
 from branches.run.runner import run_scene
 from branches.scene.closed_stage import ClosedStage
 from branches.scene.columns import FOUND, Column, error_of
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
 from branches.scene.stages import stages_of
+from branches.secondary import follow_all
 from branches.store.read import read_branch
 from ribbon_model import laws
 
@@ -200,6 +204,23 @@ def test_a_file_with_a_law_is_all_that_commands_need(tmp_path, command):
         energy = file["points"]["energy"][-1]
     y = max(root.real for root in np.roots([0.4**2, 0, 1, -4]) if not root.imag)
     assert energy == pytest.approx(y**2 / 2 + 0.4**2 * y**4 / 4, rel=1e-9)
+
+
+def test_secondary_branches_and_circles_of_a_law_of_one_s_own(tmp_path, monkeypatch):
+    """Its branch (3, 1) has a secondary branch that joins two bifurcations; kappa* of its circles is no straight line."""
+    (tmp_path / "quartic.py").write_text(LAW)
+    (law,) = laws.laws_of(tmp_path / "quartic.py").values()
+    monkeypatch.setitem(laws.LAWS, law.name, law)
+    text = "law: quartic\nm: 3\nn: 1\nparameters: {twist: 1.5, core: 0.1}\nlimits: {kappa_n: [-3, 1.15]}\n"
+    run_scene(parse(f"{text}stability: true\n", "scene"), tmp_path / "x.h5", Display(silent=True))
+    switches = follow_all(tmp_path / "x.h5", tmp_path / "all", [], Progress("", quiet=True))
+    assert [switch["outcome"] for switch in switches] == ["followed", "followed", "known", "known"]
+    panel = Figure().subplots()
+    window = (-2.0, 2.0)
+    circles(panel, read(tmp_path / "all"), "quartic, twist = 1.5, core = 0.1", 0.3, window)
+    line = panel.lines[0].get_xydata()
+    bent = 3 - line[:, 0]
+    assert line[:, 1] == pytest.approx(line[:, 0] + bent + 0.1**2 * bent**3, rel=1e-12)  # kappa_n + M1
 
 
 @pytest.mark.parametrize(
