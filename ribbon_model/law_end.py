@@ -8,7 +8,8 @@ or through a jump: two neighbouring places of the strip take different minima of
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -79,25 +80,42 @@ def closed_tests(law: Law) -> list[Event]:
 # --- open strips --------------------------------------------------------------------------------------------------------------
 
 
-def tests(section: Section, strains: Strains) -> list[Event]:
-    """Return the test function that ends a run of an open strip where the law ends; none for a law that is regular everywhere.
+@dataclass(frozen=True)
+class Place:
+    """Where a strip stands in a problem.
 
-    Parameters
+    Attributes
     ----------
-    section : Section
     strains : callable
         The strains (K, 3) at the nodes, from a discretized problem and its unknowns.
+    states : sequence of int, optional
+        Columns of quaternion, centreline, and their multipliers; by default those of a strip alone.
+    names : mapping of str to str
+        Names of the section's numbers in the problem, where they are others.
     """
+
+    strains: Strains
+    states: Sequence[int] | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def numbers(self, trial: Trial) -> SimpleNamespace:
+        """Return the numbers of the section."""
+        values = dict(zip(trial.system.problem.parameters, trial.system.all_parameters(trial.x)))
+        return SimpleNamespace(**values | {own: values[name] for own, name in self.names.items()})
+
+
+def tests(section: Section, place: Place) -> list[Event]:
+    """Return the test function that ends a run where the law of a strip ends; none for a law that is regular everywhere."""
     law = section.form
     if not law.ends:
         return []
-    margin = functools.partial(_convexity if law.ends_with_convexity else _least_margin, section, strains)
+    margin = functools.partial(_convexity if law.ends_with_convexity else _least_margin, section, place)
     return [Event("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
 
 
-def explained(section: Section, strains: Strains, run: Continuation) -> str | None:
+def explained(section: Section, tests: Sequence[Event], run: Continuation) -> str | None:
     """Return that a run met the end of the law, or failed near it, in a sentence; None for a run that stopped elsewhere."""
-    for test in tests(section, strains):
+    for test in tests:
         state, met = run.state, run.stop is not None and run.stop.event == test.name
         if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
             return f"{test.name}, {section.form.ends}"
@@ -124,17 +142,18 @@ def at_guess(section: Section, times: np.ndarray, frames: np.ndarray) -> str | N
     )
 
 
-def _least_margin(section: Section, strains: Strains, trial: Trial) -> float:
+def _least_margin(section: Section, place: Place, trial: Trial) -> float:
     """Return the least `Section.margin` along the strip, over the largest at a node.
 
     The least value is sought between the nodes: a stop at the lowest node would come late by the square of their distance.
     """
-    system, x, p = trial.system, trial.x, _numbers(trial)
-    n = system.problem.dimension
+    system, x, p = trial.system, trial.x, place.numbers(trial)
+    n, at = system.problem.dimension, place.states
+    frame, moment = (slice(4), slice(n, n + 4)) if at is None else (list(at[:4]), list(at[7:11]))
 
     def margins(times: np.ndarray) -> np.ndarray:
         states = system.evaluate(x, times).T
-        return section.margin(times, moment_on_directors(states[:4], states[n : n + 4]).T, np.empty((len(times), 0)), p)
+        return section.margin(times, moment_on_directors(states[frame], states[moment]).T, np.empty((len(times), 0)), p)
 
     times = system.nodes
     values = margins(times)
@@ -147,11 +166,7 @@ def _least_margin(section: Section, strains: Strains, trial: Trial) -> float:
     return float(least / size)
 
 
-def _convexity(section: Section, strains: Strains, trial: Trial) -> float:
+def _convexity(section: Section, place: Place, trial: Trial) -> float:
     """Return the least `Section.margin` at the strains of the nodes and on lines between these."""
-    p, omega = _numbers(trial), strains(trial.system, trial.x)
+    p, omega = place.numbers(trial), place.strains(trial.system, trial.x)
     return _least_on_lines(lambda t, w: section.margin(t, w, w, p), trial.system.nodes, omega)
-
-
-def _numbers(trial: Trial) -> SimpleNamespace:
-    return SimpleNamespace(**dict(zip(trial.system.problem.parameters, trial.system.all_parameters(trial.x))))

@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from contin import ContinError, Point, ProblemError, SegmentedVariationalProblem, VariationalSegment, solve, trace
-from contin.lowlevel import Collocation
-from ribbon_model import ends, natural_state
+from contin import ContinError, Event, Point, ProblemError, SegmentedVariationalProblem, VariationalSegment, solve, trace
+from contin.lowlevel import Collocation, Continuation
+from ribbon_model import ends, law_end, natural_state
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
 from ribbon_model.section import Section
@@ -41,6 +41,10 @@ RIGID, HINGE, BALL = "rigid", "hinge", "ball"
 START, FINISH = "start", "finish"
 #: The number that closes the gaps and turns of the joints, from 0 (as drawn) to 1.
 ASSEMBLY = "assembly"
+#: Displacements of a joint along the axes of the drawing, behind its name.
+MOVES = ("dx", "dy", "dz")
+#: Numbers of loads that act all along.
+_POTENTIALS = ("weight", "pressure", "field")
 #: A quaternion, scalar first.
 Quaternion = tuple[float, float, float, float]
 
@@ -83,6 +87,17 @@ class Member:
         axes = np.array(directors(*self.frame)).reshape(3, 3)
         return np.hstack([q, np.array(self.place) + own[:, 4:] @ axes])
 
+    def cut(self, fractions: Sequence[float]) -> list[Member]:
+        """Return the pieces of a member that is cut at fractions of its length, which increase between 0 and 1."""
+        places = [0.0, *fractions, 1.0]
+        if sorted(set(places)) != places:
+            raise ValueError(f"cut: {list(fractions)} must increase between 0 and 1")
+        begins = self.drawn([part * self.length for part in places[:-1]])
+        return [
+            Member(self.section, (end - begin) * self.length, _numbers(state[4:]), _numbers(state[:4]), self.strains)
+            for begin, end, state in zip(places, places[1:], begins)
+        ]
+
 
 def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member:
     """Return a straight member between two places, whose normal d2 is as near as possible to a direction.
@@ -102,7 +117,12 @@ def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member
         raise ValueError(f"normal: {list(normal)} lies along the member from {list(begin)} to {list(end)}")
     across /= np.linalg.norm(across)
     frame = quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0]
-    return Member(section, length, tuple(map(float, begin)), tuple(map(float, frame)))
+    return Member(section, length, _numbers(begin), _numbers(frame))
+
+
+def _numbers(values: Any) -> Any:
+    """Return a vector as a tuple of Python's numbers."""
+    return tuple(map(float, values))
 
 
 @dataclass(frozen=True)
@@ -189,7 +209,7 @@ class Network:
         Ends that belong to no joint are free.
     held : mapping of str to End
         What is held at joints, on the axes of the drawing. The displacement of joint ``A`` is prescribed by the numbers
-        ``A_x1``, ``A_x2``, ``A_x3``, its rotation by ``A_turn``, ``A_bend``, ``A_swing``, as far as they are held.
+        ``A_dx``, ``A_dy``, ``A_dz``, its rotation by ``A_turn``, ``A_bend``, ``A_swing``, as far as they are held.
     loads : mapping of str to Load
         By the name of the number.
     numbers : mapping of str to float
@@ -282,22 +302,22 @@ class Network:
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the sections."""
         angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
-        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), "weight", "pressure", "field")
+        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *_POTENTIALS)
 
     @property
     def _prescribed(self) -> tuple[str, ...]:
         """Names of the numbers that prescribe held joints."""
         found: list[str] = []
         for name, end in self.held.items():
-            found += [f"{name}_{x}" for x, *parts in zip(CENTRELINE, *end.held) if any(parts)]
+            found += [f"{name}_{x}" for x, *parts in zip(MOVES, *end.held) if any(parts)]
             found += [f"{name}_{angle}" for angle in ANGLES if end.rotation != FREE]
         return tuple(found)
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        potentials = [name for name in ("weight", "pressure", "field") if name in self.numbers]
-        always = [name for name in self.known if name not in ("weight", "pressure", "field")]
+        potentials = [name for name in _POTENTIALS if name in self.numbers]
+        always = [name for name in self.known if name not in _POTENTIALS]
         values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
         own = {
             self._full(name, number): value
@@ -433,7 +453,7 @@ class Network:
     def _prescribing(self, name: str, end: End) -> tuple[Callable, Callable, Callable, Callable]:
         """Return prescribed frame and place of a joint as functions of p, and the conditions for both."""
         drawn = _at_arm(self._drawn(self.joints[name].members[0]), self.joints[name].members[0].arm)
-        along, angles = (tuple(f"{name}_{each}" for each in names) for names in (CENTRELINE, ANGLES))
+        along, angles = (tuple(f"{name}_{each}" for each in names) for names in (MOVES, ANGLES))
         numbers, turned = self._prescribed, end.rotation != FREE
 
         def frame_of(p):
@@ -540,6 +560,51 @@ class Network:
                 f"joints: the gaps and turns could not be closed; at {closing[-1][ASSEMBLY]:.3g} of the way: {closing.stop}"
             )
         return solve(self.problem, closing[-1]), "by closing the gaps and turns of the joints step by step"
+
+    def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
+        """Return the sizes of states and numbers for `contin.Settings.scales`, at a state; see `OpenStrip.sizes`.
+
+        Places have the size of the longest member, forces and moments that of the smallest stiffness or of the largest of them.
+        """
+        known = {**self.parameters, **dict(zip((*system.problem.state_names, *system.free), system.largest(x)))}
+        stiffness = [
+            known[self._full(name, number)] for name, section in self.sections.items() for number in section.stiffnesses
+        ]
+        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in self.loads or name in _POTENTIALS]
+        force = max(min(stiffness, default=1.0), *(abs(known[name]) for name in forces))
+        length = max(member.length for member in self.members.values())
+        lengths = [name for name in system.problem.state_names if name.startswith(CENTRELINE)]
+        moves = [name for name in self._prescribed if name.endswith(MOVES)]
+        turns = [name for name in known if name not in (*forces, *lengths, *moves) and name not in self._of_sections]
+        return dict.fromkeys(turns, 1.0) | dict.fromkeys((*lengths, *moves), length) | dict.fromkeys(forces, force)
+
+    @property
+    def _of_sections(self) -> set[str]:
+        """Names of all numbers of the sections."""
+        return {self._full(name, number) for name, section in self.sections.items() for number in section.parameters}
+
+    # --- where laws end -----------------------------------------------------------------------------------------------
+
+    def _ends(self) -> list[tuple[Section, list[Event]]]:
+        """Return the section of each member, with the test function that ends a run where its law ends."""
+        found = []
+        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
+            section = self.sections[member.section]
+            names = {number: self._full(member.section, number) for number in section.parameters}
+            place = law_end.Place(functools.partial(self._strains_of, name), piece.at, names)
+            found.append((section, law_end.tests(section, place)))
+        return found
+
+    def _strains_of(self, name: str, system: Collocation, x: np.ndarray) -> np.ndarray:
+        return self.strains(system, x)[name]
+
+    def domain_tests(self) -> list[Event]:
+        """Return the test functions that end a run where a law ends; none for laws that are regular everywhere."""
+        return [test for _, tests in self._ends() for test in tests]
+
+    def explained(self, run: Continuation) -> str | None:
+        """Return that a run met the end of a law, or failed near it; None for a run that stopped elsewhere."""
+        return next((told for section, tests in self._ends() if (told := law_end.explained(section, tests, run))), None)
 
     # --- what a state is ----------------------------------------------------------------------------------------------
 

@@ -399,11 +399,11 @@ class OpenStrip:
 
     def domain_tests(self) -> list[Event]:
         """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
-        return law_end.tests(self.section, self.strains)
+        return law_end.tests(self.section, law_end.Place(self.strains))
 
     def explained(self, run: Continuation) -> str | None:
         """Return that a run met the end of the law, or failed near it; None for a run that stopped elsewhere."""
-        return law_end.explained(self.section, self.strains, run)
+        return law_end.explained(self.section, self.domain_tests(), run)
 
     # --- what a state is ----------------------------------------------------------------------------------------------
 
