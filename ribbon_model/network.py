@@ -610,9 +610,11 @@ class Network:
 
     def strains(self, system: Collocation, x: np.ndarray) -> dict[str, np.ndarray]:
         """Return the strains (K, 3) of each member at the nodes of a discretized state."""
-        states, p = system.states(x), system.all_parameters(x)
-        rates = self.problem.batch("field").values(system.nodes, states, states[:0], p)
-        found = {}
+        return self.strains_at(system.nodes, system.states(x), system.all_parameters(x))
+
+    def strains_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the same at parts t (K,) of the lengths, from states (K, n) and the values of all parameters."""
+        rates, found = self.problem.batch("field").values(t, states, states[:0], p), {}
         for (name, member), piece in zip(self.members.items(), self.problem.pieces):
             at = list(piece.at[:4])
             found[name] = strains_of(states[:, at], rates[:, at]) / member.length
@@ -635,7 +637,7 @@ class Network:
         found = {}
         for name in self.held:
             joint = self.joints[name]
-            origin = _at_arm(self._state(point, joint.members[0])[:7], joint.members[0].arm)
+            origin = self.place(point, name)
             force, moment = np.zeros(3), np.zeros(3)
             for each in joint.members:
                 pull, couple, place = self._at_end(point, each)
@@ -670,6 +672,11 @@ class Network:
         row = self._state(point, each)
         sign = -1.0 if each.end == START else 1.0
         return sign * row[11:14], sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
+
+    def place(self, point: Point, joint: str) -> np.ndarray:
+        """Return the place (3,) of a joint."""
+        first = self.joints[joint].members[0]
+        return _at_arm(self._state(point, first)[:7], first.arm)
 
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:
         """Return quaternion, place, and their multipliers (14,) at an end."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ribbon_model.ends import DIRECTIONS
-from ribbon_model.shape import Shape
+from ribbon_model.shape import Shape, Structure
 
 #: A direction with a larger component along the tangent is that of a strip that stands upright.
 _UPRIGHT = 0.99
@@ -18,11 +18,18 @@ def flat_across(shape, law):
     return shape if law.has_rulings else replace(shape, eta=np.zeros_like(shape.eta))
 
 
-def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape:
+def standing(shape: Shape | Structure, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape | Structure:
     """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
     z = np.array(up)
     ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
     x = np.array(ahead) - z * (z @ ahead)
     x /= np.linalg.norm(x)
     axes = np.array([x, np.cross(z, x), z])
-    return replace(shape, centreline=shape.centreline @ axes.T, directors=shape.directors @ axes.T)
+    return moved(shape, axes, np.zeros(3))
+
+
+def moved(shape, axes: np.ndarray, by: np.ndarray):
+    """Return a shape, or a structure, on new axes (rows), moved there."""
+    if isinstance(shape, Structure):
+        return Structure(tuple(moved(part, axes, by) for part in shape.parts))
+    return replace(shape, centreline=shape.centreline @ axes.T + by, directors=shape.directors @ axes.T)

@@ -1,4 +1,4 @@
-"""A closed strip as a picture: its lit surface with hidden parts hidden, pixel by pixel, at its width."""
+"""A strip or a structure of them as a picture: its lit surface with hidden parts hidden, pixel by pixel, at its width."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from ribbon_model.shape import parts_of
 
 FRONT, BACK, EDGE = "#E8A33D", "#7A5195", "#2B1D0E"
 #: Width of a strip of unknown dimensions, in units of L/2 pi. Ten times more covers the loop's own radius.
@@ -76,7 +78,7 @@ def places(strip) -> np.ndarray:
 
 def reach_of(shapes, width: float, view: View = OBLIQUE) -> float:
     """Half the side of the square in which all these strips have room."""
-    corners = np.concatenate([shape.surface(width).reshape(-1, 3) for shape in shapes])
+    corners = np.concatenate([part.surface(width).reshape(-1, 3) for shape in shapes for part in parts_of(shape)])
     return 1.03 * float(np.abs(corners @ view.axes[:2].T).max())
 
 
@@ -95,25 +97,25 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     """
     fine = pixels * _FINE
     scale = fine / (2 * reach)
-    points, normals, across = _samples(shape, width, scale)
-    screen = points.reshape(-1, 3) @ view.axes.T
+    line = min(_LINE * _FINE / scale, _LINE_PART * width)
+    samples = [_samples(part, width, scale, line) for part in parts_of(shape)]
+    points, normals, at_edge = (np.concatenate(column) for column in zip(*samples))
+    screen = points @ view.axes.T
     place, nearness = _places(screen, reach, fine)
     seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
     seen = seen[place[seen] >= 0]
     nearest = np.full(fine * fine, -1)
     nearest[place[seen]] = seen
     covered = np.flatnonzero(nearest >= 0)
-    station, number = np.divmod(nearest[covered], len(across))
-    line = min(_LINE * _FINE / scale, _LINE_PART * width)
     canvas = np.zeros((fine * fine, 4), np.float32)
-    canvas[covered] = _colours(normals[station] @ view.axes.T, width / 2 - np.abs(across[number]) < line)
+    canvas[covered] = _colours(normals[nearest[covered]] @ view.axes.T, at_edge[nearest[covered]])
     canvas = canvas.reshape(pixels, _FINE, pixels, _FINE, 4).mean(axis=(1, 3))
     canvas[..., :3] /= np.maximum(canvas[..., 3:], 1e-6)
     return canvas.clip(0, 1)
 
 
-def _samples(shape, width: float, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of the surface (A, B, 3): along it, with its unit normals there (A, 3); and across it, from v (B,)."""
+def _samples(shape, width: float, scale: float, line: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of the surface of a strip (K, 3), its unit normals there (K, 3), and whether they lie within a line at an edge."""
     from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
     s, keep = np.unique(shape.arclength, return_index=True)
@@ -125,7 +127,8 @@ def _samples(shape, width: float, scale: float) -> tuple[np.ndarray, np.ndarray,
     count = math.ceil(width * np.linalg.norm(ruling, axis=1).max() * scale * _DENSE) + 2
     across = np.linspace(-width / 2, width / 2, count)
     points = middle[:, None] + across[:, None] * ruling[:, None]
-    return points, normal / np.linalg.norm(normal, axis=1)[:, None], across
+    normals = np.repeat(normal / np.linalg.norm(normal, axis=1)[:, None], count, axis=0)
+    return points.reshape(-1, 3), normals, np.tile(width / 2 - np.abs(across) < line, len(fine))
 
 
 def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns,
 from branches.scene.errors import errors_of
 from branches.scene.fields import ConfigError
 from branches.scene.labels import CONJUGATE, label_of, without_round_off
-from branches.scene.open_strip import OpenScene
+from branches.scene.open_strip import OpenScene, StagedScene
 from branches.scene.stage import Stage, Watch
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text, point_of
@@ -97,7 +97,7 @@ class OpenStage(Stage):
         self.scene, self.number, self.stage, self.strip = scene, number, scene.stages[number - 1], scene.strip(number)
         self.follow, self.problem = self.stage.follow, self.strip.problem
         self.free, self.watch = (self.follow, *self.problem.multipliers), SymmetriesWatch(scene.strip())
-        felt = CONJUGATE.get(self.follow, "energy")
+        felt = self.felt(self.follow)
         self.conjugate = felt if felt in self.columns().all else "energy"
         sizes = scene.dimensions
         length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
@@ -112,7 +112,19 @@ class OpenStage(Stage):
     # --- the run --------------------------------------------------------------------------------------------------------
 
     def start(self, earlier: Sequence[Sequence[Point]] = ()) -> Continuation:
-        return self._run(first_state(self.scene) if self.number == 1 else self._origin(earlier))
+        return self._run(self.first() if self.number == 1 else self._origin(earlier))
+
+    def first(self) -> Point:
+        """Return the state from which the first stage starts; raise ConfigError where there is none."""
+        return first_state(self.scene)
+
+    def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
+        """Return the system of this stage and the unknowns of a state of another one, with other numbers."""
+        return with_ends(self.strip, origin, self.follow, numbers)
+
+    def mesh_control(self) -> MeshControl:
+        """Return how the mesh adapts."""
+        return _mesh_control(self.scene)
 
     def resume(self, state: State, first: tuple[Collocation, np.ndarray, np.ndarray], earlier) -> Continuation:
         settings = self.start(earlier).settings  # those of the stage's start, to the last bit
@@ -215,7 +227,7 @@ class OpenStage(Stage):
             return Continuation(system, x, self._settings(system, x))
         numbers = {name: value / self.scene.factor(name) for name, value in stage.numbers.items()}
         try:
-            system, x = with_ends(strip, origin, stage.follow, numbers)
+            system, x = self.restated(origin, numbers)
             return Continuation(system, x, self._settings(system, x))
         except ValueError as error:
             raise ConfigError(f"start, finish: {error}") from error
@@ -264,7 +276,7 @@ class OpenStage(Stage):
         return Settings(
             primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
             max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
-            zeros=zeros, mesh=_mesh_control(self.scene), newton=_newton(self.scene), events=self.strip.domain_tests(),
+            zeros=zeros, mesh=self.mesh_control(), newton=newton_of(self.scene), events=self.strip.domain_tests(),
             scales=self.strip.sizes(system, x),
         )  # fmt: skip
 
@@ -278,53 +290,72 @@ class OpenStage(Stage):
         numbers = dict.fromkeys(name for problem in problems for name in problem.parameters if name not in hidden)
         found = dict.fromkeys(name for problem in problems for name in problem.functionals if name not in numbers)
         followed = {stage.follow for stage in self.scene.stages}
-        columns = [_column(name, error_of(name) if name in followed else None) for name in numbers]
-        columns += [_column(name, error_of(name), role=FOUND) for name in found]
+        columns = [self._column(name, error_of(name) if name in followed else None) for name in numbers]
+        columns += [self._column(name, error_of(name), role=FOUND) for name in found]
         columns.append(Column("stage", "stage of the scene, from 1", lambda row: row.stage.number, None, "i4", BOOK))
-        own = (
-            "potential",
-            *REACTIONS,
-            *(("F_roller",) if self.scene.roller else ()),
-            *(("F_stroke",) if STROKE in numbers else ()),
+        return Columns(
+            (*columns, *(self._column(name, error_of(name), role=FOUND) for name in self.found_names(numbers))), True
         )
-        return Columns((*columns, *(_column(name, error_of(name), role=FOUND) for name in own)), True)
+
+    def words(self, name: str) -> tuple[str, str]:
+        """Return the words of a column, and those of its axis."""
+        return _WORDS.get(name, (name, name))
+
+    def _column(self, name: str, error, role: str = NUMBER) -> Column:
+        words, axis = self.words(name)
+        return Column(name, words, error=error, role=role, axis=axis)
+
+    def found_names(self, numbers: Collection[str]) -> tuple[str, ...]:
+        """Return the names of what is found in states, besides functionals; ``numbers`` are those of all stages."""
+        roller, stroke = ("F_roller",) if self.scene.roller else (), ("F_stroke",) if STROKE in numbers else ()
+        return ("potential", *REACTIONS, *roller, *stroke)
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
         """Loads that do not act are zero; angles that are not prescribed are those of the last end."""
         states = point.system.states(point.x)
-        found = {**point.parameters, **point.functionals, **self._found(point, states)}
+        found = {**point.parameters, **point.functionals, **self.found(point, states)}
         absent = {name: 0.0 for name in names if name not in found}
         if set(ANGLES) & set(absent):
             absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
         return absent | found
 
     def errors(self, point: Point) -> Mapping[str, float]:
-        found = errors_of(point, lambda at: {**at.functionals, **self._found(at, at.system.states(at.x))})
+        found = errors_of(point, lambda at: {**at.functionals, **self.found(at, at.system.states(at.x))})
         return found | point.errors
 
-    def _found(self, point: Point, states: np.ndarray) -> dict[str, float]:
+    def found(self, point: Point, states: np.ndarray) -> dict[str, float]:
         """Return the potential and the reactions."""
         return {"potential": self.strip.potential(point), **self.strip.reactions_of(states)}
 
     # --- words ----------------------------------------------------------------------------------------------------------
 
     def row(self, point: Point, step: float) -> str:
-        factor, stiffness = self.scene.factor, self.strip.section.stiffness
+        factor = self.scene.factor
         self._largest = max(self._largest, abs(point[self.follow] * factor(self.follow)))
-        force, energy = (
-            without_round_off(found, stiffness) * factor(name)
-            for name, found in (("F_tangent", self.strip.reactions(point)["F_tangent"]), ("energy", point["energy"]))
-        )
+        force, energy = (without_round_off(found, self.stiffness) * factor(name) for name, found in self.told_values(point))
         value = without_round_off(point[self.follow] * factor(self.follow), self._largest)
         return (
             f"{value:14.8g}  {energy:12.6g}  {force:12.6g}"
             f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
         )
 
+    @property
+    def stiffness(self) -> float:
+        """What forces and energies that are round-off are compared with."""
+        return self.strip.section.stiffness
+
+    def felt(self, name: str) -> str:
+        """Return the column that is conjugate to a number, up to a sign and a factor."""
+        return CONJUGATE.get(name, "energy")
+
+    def told_values(self, point: Point) -> list[tuple[str, float]]:
+        """Return the two columns of the table that a run shows, behind the number that is followed: the second one first."""
+        return [("F_tangent", self.strip.reactions(point)["F_tangent"]), ("energy", point["energy"])]
+
     def describe(self, event: Any, largest: float) -> str:
         name, factor = self.follow, self.scene.factor(self.follow)
         label, error = event["label"].decode(), event[f"error_{name}"] * factor
-        shown = dict.fromkeys(("energy", CONJUGATE.get(name, "energy")))  # and what is conjugate to the followed number
+        shown = dict.fromkeys(("energy", self.felt(name)))  # and what is conjugate to the followed number
         others = "".join(f", {text}" for text in (self._with_error(event, column) for column in shown) if text)
         singular = label_of(label).singular
         found = f" (± {error:.0e})" if singular and not math.isnan(error) else ""
@@ -348,11 +379,6 @@ class OpenStage(Stage):
 def _rounded(value: float, error: float) -> str:
     """Return a number with ten digits; 0 where it is smaller than its error."""
     return "0" if abs(value) < error else f"{value:.10g}"
-
-
-def _column(name: str, error, role: str = NUMBER) -> Column:
-    words, axis = _WORDS.get(name, (name, name))
-    return Column(name, words, error=error, role=role, axis=axis)
 
 
 # --- the first state --------------------------------------------------------------------------------------------------
@@ -379,12 +405,12 @@ def first_state(scene: OpenScene) -> Point:
             intervals = strip.roller.intervals(mesh.intervals)
             if guess is not None and "roller" not in scene.numbers:  # it touches the strip where it is
                 values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
-        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene), newton=_newton(scene))
+        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene), newton=newton_of(scene))
     except (ProblemError, ValueError) as error:
         raise ConfigError(f"begin: {scene.begin}: {error}") from error
 
 
-def _newton(scene: OpenScene) -> Newton:
+def newton_of(scene: StagedScene) -> Newton:
     return Newton(scene.steps.newton_tolerance or Newton.tolerance)
 
 

@@ -10,6 +10,7 @@ import functools
 import itertools
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -151,16 +152,14 @@ class DimensionsConfig(Strict):
         return self.youngs_modulus * self.thickness**3 * self.width / (12 * (1 - self.poisson_ratio**2))
 
 
-class StageConfig(Strict):
-    """One stage: a number that is followed from a labelled point to a value; from there on, the ends may be held otherwise."""
+class FollowConfig(Strict):
+    """One stage: a number that is followed from a labelled point to a value."""
 
     follow: str = Field(description="the number that is followed")
     to: float = Field(description="the value at which the stage ends")
     start_at: str | None = Field(None, description="labelled point to start from, as in BP 2 (the end of the stage before)")
     stage: int | None = Field(None, ge=1, description="number of the stage of that point (the one before)")
     way: Literal["forward", "backward"] = Field("forward", description="which of the two ways away from a branch point")
-    start: EndWords | None = Field(None, description="what is held at the first end from here on (as before)")
-    finish: EndWords | None = Field(None, description="what is held at the last end from here on (as before)")
     numbers: dict[str, float] = Field(default_factory=dict, description="numbers that the stage begins with (as before)")
     max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
     limits: dict[str, Interval] = Field(default_factory=dict)
@@ -181,6 +180,13 @@ class StageConfig(Strict):
         label, _, count = self.start_at.partition(" ")
         found = [place for place, (other, name) in enumerate(labelled) if other == label and name != START]
         return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
+
+
+class StageConfig(FollowConfig):
+    """A stage of an open strip; from there on, the ends may be held otherwise."""
+
+    start: EndWords | None = Field(None, description="what is held at the first end from here on (as before)")
+    finish: EndWords | None = Field(None, description="what is held at the last end from here on (as before)")
 
 
 def _expression(value: Any) -> Any:
@@ -211,7 +217,65 @@ class OpenMesh(MeshConfig):
     tolerance: float = Field(1e-9, ge=1e-14, le=1e-2)
 
 
-class OpenScene(Scene):
+class StagedScene(Scene):
+    """What scenes share whose numbers are followed in stages."""
+
+    @abstractmethod
+    def strip(self, stage: int = 1):
+        """Return the mechanics of a stage, from 1; raise ValueError for fields that do not fit."""
+
+    def check_stages(self, columns: Sequence[str]) -> None:
+        """Raise ValueError for a stage that names what is not there; ``columns`` are others than the numbers."""
+        for number, stage in enumerate(self.stages, 1):
+            if stage.stage is not None and stage.stage >= number:
+                raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
+            parameters = self.strip(number).parameters
+            if stage.follow not in parameters:
+                followed = ", ".join(parameters)
+                near = meant(stage.follow, parameters)
+                raise ValueError(f"stage {number}: follow: {stage.follow!r}{near} must be one of the numbers here: {followed}")
+            if number == 1 and (stage.start_at or stage.stage):
+                raise ValueError("stage 1: start_at: the first stage starts from the first state")
+            for name in stage.numbers:
+                if name not in parameters:
+                    near = meant(name, parameters)
+                    raise ValueError(f"stage {number}: numbers: {name!r}{near} must be one of {', '.join(parameters)}")
+            for name in (*stage.limits, *stage.label):
+                known = dict.fromkeys((*parameters, *columns, "energy"))
+                if name not in known:
+                    raise ValueError(
+                        f"stage {number}: {name!r}{meant(name, known)} must be one of the columns {', '.join(known)}"
+                    )
+
+    @property
+    def stage_count(self) -> int:
+        return len(self.stages)
+
+    def up_to(self, count: int) -> Scene:
+        return self.model_copy(update={"stages": self.stages[:count]})
+
+    def file_of(self, numbers: dict[str, Any]) -> str:
+        return "_".join(f"{name}{_text(value)}".replace(" ", "_") for name, value in numbers.items()) + ".h5"
+
+    @classmethod
+    def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
+        return ", ".join(f"{name} = {_text(value)}" for name, value in numbers.items())
+
+    def words(self, numbers: dict[str, Any]) -> str:
+        return self.words_of({}, numbers)
+
+    @property
+    def heading(self) -> str:
+        return self.title or self.name
+
+    title_or_name = heading
+
+    def value(self, name: str, number: float) -> str:
+        """Return a number with its unit, as text."""
+        return f"{exact_text(number)} {self.unit(name)}".strip()
+
+
+class OpenScene(StagedScene):
     """An open strip (or a closed, twisted one), and the stages in which its numbers are followed."""
 
     KIND: ClassVar[str] = "open strip"
@@ -262,27 +326,9 @@ class OpenScene(Scene):
         if self.closed is not None and (self.start, self.finish) != (EndConfig(), EndConfig()):
             raise ValueError("closed: must not be given together with start or finish")
         for number, stage in enumerate(self.stages, 1):
-            if stage.stage is not None and stage.stage >= number:
-                raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
             if number == 1 and (stage.start or stage.finish or stage.numbers):
                 raise ValueError("stage 1: start, finish, numbers: those of the scene are the first stage's")
-            strip = self.strip(number)
-            if stage.follow not in strip.parameters:
-                followed = ", ".join(strip.parameters)
-                near = meant(stage.follow, strip.parameters)
-                raise ValueError(f"stage {number}: follow: {stage.follow!r}{near} must be one of the numbers here: {followed}")
-            if number == 1 and (stage.start_at or stage.stage):
-                raise ValueError("stage 1: start_at: the first stage starts from the first state")
-            for name in stage.numbers:
-                if name not in strip.parameters:
-                    near = meant(name, strip.parameters)
-                    raise ValueError(f"stage {number}: numbers: {name!r}{near} must be one of {', '.join(strip.parameters)}")
-            for name in (*stage.limits, *stage.label):
-                if name not in (*strip.parameters, *PLACE, "energy"):
-                    known = dict.fromkeys((*strip.parameters, *PLACE, "energy"))
-                    raise ValueError(
-                        f"stage {number}: {name!r}{meant(name, known)} must be one of the columns {', '.join(known)}"
-                    )
+        self.check_stages(PLACE)
         return self
 
     # --- the strip ----------------------------------------------------------------------------------------------------
@@ -327,13 +373,7 @@ class OpenScene(Scene):
                 values["Gamma"] = d.width**2 / (d.thickness * d.length)
         if law is None:
             raise ValueError("material: the field 'law' is missing")
-        numbers = {}
-        for name, value in values.items():
-            if isinstance(value, str) and not (name == "B2" and value == "inf"):
-                raise ValueError(f"material: {name}: must be a number, not {value!r}")
-            if not name.isidentifier():
-                raise ValueError(f"material: {name!r} is not usable as a name")
-            numbers[name] = math.inf if isinstance(value, str) else value / self.factor(name)
+        numbers = {name: value / self.factor(name) for name, value in numbers_of("material", values).items()}
         return section_of(str(law), numbers, self.along)
 
     @functools.cached_property
@@ -392,31 +432,8 @@ class OpenScene(Scene):
         return unusual(self.dimensions.model_dump()) if self.dimensions else []
 
     @property
-    def stage_count(self) -> int:
-        return len(self.stages)
-
-    def up_to(self, count: int) -> Scene:
-        return self.model_copy(update={"stages": self.stages[:count]})
-
-    def file_of(self, numbers: dict[str, Any]) -> str:
-        return "_".join(f"{name}{_text(value)}".replace(" ", "_") for name, value in numbers.items()) + ".h5"
-
-    @classmethod
-    def words_of(cls, fields: dict, numbers: dict[str, Any]) -> str:
-        return ", ".join(f"{name} = {_text(value)}" for name, value in numbers.items())
-
-    def words(self, numbers: dict[str, Any]) -> str:
-        return self.words_of({}, numbers)
-
-    @property
     def law_name(self) -> str:
         return self.strip().section.law.name
-
-    @property
-    def heading(self) -> str:
-        return self.title or self.name
-
-    title_or_name = heading
 
     @property
     def name(self) -> str:
@@ -427,9 +444,17 @@ class OpenScene(Scene):
             return f"{law}, closed with {twists} half twist{'s' * (abs(twists) != 1)}"
         return f"{law}, {self.strip().start.words} and {self.strip().finish.words}"
 
-    def value(self, name: str, number: float) -> str:
-        """Return a number with its unit, as text."""
-        return f"{exact_text(number)} {self.unit(name)}".strip()
+
+def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:
+    """Return the numbers of a section; B2 may be infinite, as text. Raise ValueError for others."""
+    found = {}
+    for name, value in values.items():
+        if isinstance(value, str) and not (name == "B2" and value == "inf"):
+            raise ValueError(f"{what}: {name}: must be a number, not {value!r}")
+        if not name.isidentifier():
+            raise ValueError(f"{what}: {name!r} is not usable as a name")
+        found[name] = math.inf if isinstance(value, str) else value
+    return found
 
 
 def _stage_in_si_units(stage: Any) -> Any:

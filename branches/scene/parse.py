@@ -68,7 +68,9 @@ def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
         _put(values, parts, read(value, f"--set {plain(key)}"))
     kind: type[Scene] = ClosedScene
-    if "stages" in values:
+    if "strips" in values:
+        from branches.scene.network import NetworkScene as kind
+    elif "stages" in values:
         from branches.scene.open_strip import OpenScene as kind  # 0.15 s, which closed strips do not need
     try:
         values = kind.prepared(values)

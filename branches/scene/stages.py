@@ -23,4 +23,10 @@ def _open(scene: Scene) -> list[Stage]:
     return [OpenStage(scene, number) for number in range(1, scene.stage_count + 1)]
 
 
-_KINDS = {"closed strip": _closed, "open strip": _open}
+def _network(scene: Scene) -> list[Stage]:
+    from branches.scene.network_stage import NetworkStage
+
+    return [NetworkStage(scene, number) for number in range(1, scene.stage_count + 1)]
+
+
+_KINDS = {"closed strip": _closed, "open strip": _open, "network": _network}

@@ -14,7 +14,7 @@ from branches.store.files import StoreError
 FORMAT = "ribbon continuation branch"
 FORMAT_VERSION = 1
 #: Kinds of strips: the attribute ``kind`` of a file. Files without it are of closed strips.
-CLOSED, OPEN = "closed strip", "open strip"
+CLOSED, OPEN, NETWORK = "closed strip", "open strip", "network"
 #: Columns that every reader may count on, whatever the version that wrote them.
 _COLUMNS = {
     CLOSED: {
@@ -23,6 +23,10 @@ _COLUMNS = {
     },
     OPEN: {
         "points": ("point", "label", "arclength", "energy", "stage", "index", "F_tangent"),
+        "events": ("point", "label", "name", "energy", "stage", "index", "index_before", "index_after"),
+    },
+    NETWORK: {
+        "points": ("point", "label", "arclength", "energy", "stage", "index", "potential"),
         "events": ("point", "label", "name", "energy", "stage", "index", "index_before", "index_after"),
     },
 }

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from branches.draw.shapes import flat_across, standing
+from branches.draw.shapes import flat_across, moved, standing
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, SIDE, View
 from branches.scene.labels import without_round_off
@@ -19,7 +19,7 @@ from ribbon_model.changed_ends import fitted
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
-from ribbon_model.shape import Shape, interpolated, shape_of
+from ribbon_model.shape import Shape, interpolated, parts_of, shape_of
 
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
@@ -130,7 +130,7 @@ class OpenBranch(StoredBranch):
         found = {point: standing(self.shape(point), self.up) for point in points}
         all_points = np.concatenate([shape.centreline for shape in found.values()] or [np.zeros((1, 3))])
         middle = (all_points.max(axis=0) + all_points.min(axis=0)) / 2
-        return {point: replace(shape, centreline=shape.centreline - middle) for point, shape in found.items()}
+        return {point: moved(shape, np.eye(3), -middle) for point, shape in found.items()}
 
     @property
     def view(self) -> View:
@@ -143,7 +143,7 @@ class OpenBranch(StoredBranch):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         if asked is None:
             asked = self.width_at(1.0, None) or _WIDTH
-        return min([asked, *(ROOM * widest(strip) for strip in strips)])
+        return min([asked, *(ROOM * widest(part) for strip in strips for part in parts_of(strip))])
 
     # --- places ---------------------------------------------------------------------------------------------------------
 

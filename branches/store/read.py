@@ -12,7 +12,7 @@ from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import parse
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
-from branches.store.layout import CLOSED, OPEN
+from branches.store.layout import CLOSED, NETWORK, OPEN
 from branches.store.writer import open_branch
 
 
@@ -59,7 +59,7 @@ def _branch(file: h5py.File, name: str) -> StoredBranch:
 
 def _class_of(scene: Scene) -> type[StoredBranch]:
     """Return the class of results of a kind of strip."""
-    return {CLOSED: _closed, OPEN: _open}[scene.KIND]()
+    return {CLOSED: _closed, OPEN: _open, NETWORK: _network}[scene.KIND]()
 
 
 def _closed() -> type[StoredBranch]:
@@ -72,6 +72,12 @@ def _open() -> type[StoredBranch]:
     from branches.store.open_branch import OpenBranch
 
     return OpenBranch
+
+
+def _network() -> type[StoredBranch]:
+    from branches.store.network_branch import NetworkBranch
+
+    return NetworkBranch
 
 
 def complete_run(path: Path, scene: Scene) -> StoredBranch | None:

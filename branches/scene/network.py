@@ -1,0 +1,306 @@
+"""Scenes of networks: strips as they are drawn, joints, what is held and what acts, and stages that are followed.
+
+A scene with ``strips`` is one. Numbers are in any unit of length and, for stiffnesses, a bending modulus
+(`ribbon_model.network`).
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from branches.scene.fields import StepConfig, Strict
+from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, numbers_of
+from ribbon_model.ends import DIRECTIONS, LOOSE
+from ribbon_model.network import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, Network, straight
+from ribbon_model.section import Section, section_of
+from ribbon_model.shape import quaternions
+
+#: An end of a strip, or a place along it, in words.
+_PLACE = re.compile(r"(\w+) (?:(start|finish)|at (0?\.\d+))")
+#: What a place may be called, for messages.
+_PLACES = "a strip and start, finish or a part of its length, as in 'beam start' or 'beam at 0.3'"
+
+
+def _vector(value: Any) -> tuple[float, float, float]:
+    if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
+        raise ValueError(f"must be three numbers, not {value!r}")
+    x, y, z = value
+    return float(x), float(y), float(z)
+
+
+Vector = Annotated[tuple[float, float, float], BeforeValidator(_vector)]
+
+
+class StripConfig(Strict):
+    """A strip as it is drawn: straight between two places, or from a place or another strip on, straight or bent."""
+
+    section: str | None = Field(None, description="one of the sections (the only one)")
+    begin: Vector | None = Field(None, description="where it begins")
+    end: Vector | None = Field(None, description="where it ends")
+    after: str | None = Field(None, description="the strip that it goes on from, in the same direction")
+    along: Direction | None = Field(None, description="direction in which it begins")
+    normal: Direction | None = Field(None, description="direction of its normal where it begins, as near as it can be")
+    length: float | None = Field(None, gt=0, description="its length, without an end")
+    bend: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing bends about its width, in radians")
+    twist: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing is twisted")
+
+    @model_validator(mode="after")
+    def _fits(self):
+        if (self.begin is None) == (self.after is None):
+            raise ValueError("begin, after: give one of them")
+        if self.end is not None:
+            given = [name for name in ("after", "along", "length") if getattr(self, name) is not None]
+            if given or self.bend or self.twist:
+                raise ValueError(f"end: must not be given together with {', '.join(given) or 'bend or twist'}")
+        elif self.length is None:
+            raise ValueError("end, length: give one of them")
+        needs = ("normal",) if self.end is not None else ("along", "normal") if self.begin is not None else ()
+        for name in needs:
+            if getattr(self, name) is None:
+                raise ValueError(f"{name}: is missing; a strip that begins at a place needs it")
+        if self.after is not None and (self.along is not None or self.normal is not None):
+            raise ValueError("after: must not be given together with along or normal")
+        return self
+
+
+class JointConfig(Strict):
+    """Ends that meet."""
+
+    strips: list[str] = Field(min_length=1, max_length=100, description=f"each {_PLACES}")
+    hinge: Direction | None = Field(None, description="axis of a hinge, which turns with the first strip")
+    ball: bool = Field(False, description="the strips turn freely against each other")
+    angle: dict[str, float | str] = Field(
+        default_factory=dict, description="angles by which ends are turned against the drawing, or names of numbers"
+    )
+    about: Direction = Field(DIRECTIONS["width"], description="axis of these angles")
+    arm: dict[str, Vector] = Field(default_factory=dict, description="from an end to the joint, on the directors of the end")
+
+    @model_validator(mode="after")
+    def _fits(self):
+        if self.ball and self.hinge is not None:
+            raise ValueError("hinge, ball: give one of them")
+        for part in ("angle", "arm"):
+            for name in getattr(self, part):
+                if name not in self.strips:
+                    raise ValueError(f"{part}: {name!r} must be one of the strips of the joint: {', '.join(self.strips)}")
+        return self
+
+
+def _joint(value: Any) -> Any:
+    return {"strips": value} if isinstance(value, list) else value
+
+
+class ForceConfig(Strict):
+    """What a load does at a joint."""
+
+    force: Vector | None = Field(None, description="direction and size of the force, for a number of 1")
+    arm: Vector = Field((0.0, 0.0, 0.0), description="from the joint to where it acts, on the axes of the drawing")
+    moment: float | None = Field(None, description="size of the moment about the axis of the hinge, for a number of 1")
+
+    @model_validator(mode="after")
+    def _fits(self):
+        if (self.force is None) == (self.moment is None):
+            raise ValueError("force, moment: give one of them")
+        return self
+
+
+def _force(value: Any) -> Any:
+    return {"force": value} if isinstance(value, list) else value
+
+
+class NetworkDirections(Strict):
+    """Where loads point to."""
+
+    weight: Direction = (0.0, -1.0, 0.0)
+    pressure: Direction = Field(
+        (1.0, 0.0, 0.0), description="the normal of the plane, about which the strips go around an area"
+    )
+    field: Direction = Field((0.0, 1.0, 0.0), description="of a uniform field on magnetized strips")
+
+
+class NetworkScene(StagedScene):
+    """Strips that meet at joints, and the stages in which their numbers are followed."""
+
+    KIND: ClassVar[str] = "network"
+    LISTS: ClassVar[tuple] = (
+        ("sections", "*", "*"), ("material", "*"), ("numbers", "*"), ("stages", "#", "to"), ("stages", "#", "numbers", "*"),
+    )  # fmt: skip
+
+    dimensions: ClassVar[None] = None
+
+    title: str = ""
+    material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
+    sections: dict[str, dict[str, float | int | str]] = Field(default_factory=dict, description="several of these, by name")
+    strips: dict[str, StripConfig] = Field(min_length=1, max_length=200)
+    joints: dict[str, Annotated[JointConfig, BeforeValidator(_joint)]] = Field(default_factory=dict)
+    held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints; nothing: the network floats")
+    loads: dict[str, dict[str, Annotated[ForceConfig, BeforeValidator(_force)]]] = Field(default_factory=dict)
+    numbers: dict[str, float] = Field(default_factory=dict)
+    directions: NetworkDirections = NetworkDirections()
+    magnetized: Literal["width", "normal", "tangent"] = "tangent"
+    stages: list[FollowConfig] = Field(min_length=1, max_length=50)
+    mesh: OpenMesh = OpenMesh(degree=6)
+    steps: StepConfig = StepConfig()
+    stride: int = Field(1, ge=1)
+
+    @model_validator(mode="after")
+    def _fits(self):
+        for names in (self.sections, self.strips, self.joints, self.loads):
+            for name in names:
+                if not name.isidentifier():
+                    raise ValueError(f"{name!r} is not usable as a name (letters, digits and _)")
+        if (self.material is None) == (not self.sections):
+            raise ValueError("material, sections: give one of them")
+        self.check_stages([f"{name}_{axis}" for name in self.strip().joints for axis in "xyz"])
+        return self
+
+    # --- the network --------------------------------------------------------------------------------------------------
+
+    def strip(self, stage: int = 1) -> Network:
+        """Return the network, which is the same in all stages; raise ValueError for fields that do not fit."""
+        return self._network
+
+    @functools.cached_property
+    def _network(self) -> Network:
+        sections = self._sections()
+        members, joints = self._drawn(sections), {}
+        cuts: dict[str, list[float]] = {}
+        for where, place in self._places():
+            name, end, part = _parsed(where, place, members)
+            if end is None and part not in cuts.setdefault(name, []):
+                cuts[name].append(part)
+        pieces: dict[str, list[str]] = {}
+        for name, member in list(members.items()):
+            parts = sorted(cuts.get(name, []))
+            if parts:
+                pieces[name] = [f"{name}_{number}" for number in range(1, len(parts) + 2)]
+                del members[name]
+                members.update(zip(pieces[name], member.cut(parts)))
+        for name, joint in self.joints.items():
+            ends = [
+                JointEnd(piece, end, joint.angle.get(place, 0.0), joint.about, joint.arm.get(place, (0.0, 0.0, 0.0)))
+                for place in joint.strips
+                for piece, end in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
+            ]
+            kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
+            joints[name] = Joint(ends, kind, joint.hinge or DIRECTIONS["width"])
+        loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
+        for name, parts in pieces.items():  # what no joint of the scene joins is one strip still
+            for one, other in zip(parts, parts[1:]):
+                ends = [JointEnd(one, FINISH), JointEnd(other, START)]
+                if not any((each.member, each.end) == (one, FINISH) for joint in joints.values() for each in joint.members):
+                    joints[f"{one}_{other}"] = Joint(ends)
+            del name
+        numbers = dict(self.numbers)
+        for stage in self.stages:
+            numbers.update(
+                {name: 0.0 for name in (stage.follow, *stage.numbers) if name in ("weight", "pressure", "field")} | numbers
+            )
+        where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
+        held = {name: end.end() for name, end in self.held.items()}
+        return Network(sections, members, joints, held, loads, numbers, where.weight, where.pressure, where.field, first)
+
+    def _sections(self) -> dict[str, Section]:
+        given = self.sections if self.material is None else {"strip": self.material}
+        found = {}
+        for name, values in given.items():
+            where = "material" if self.material is not None else f"sections: {name}"
+            if "law" not in values:
+                raise ValueError(f"{where}: the field 'law' is missing")
+            law, numbers = str(values["law"]), {number: value for number, value in values.items() if number != "law"}
+            try:
+                found[name] = section_of(law, numbers_of(where, numbers))
+            except ValueError as error:
+                raise ValueError(str(error) if str(error).startswith(where) else f"{where}: {error}") from error
+        return found
+
+    def _drawn(self, sections: dict[str, Section]) -> dict[str, Member]:
+        """Return the members; each strip must come after the one that it goes on from."""
+        found: dict[str, Member] = {}
+        for name, strip in self.strips.items():
+            section = strip.section or (next(iter(sections)) if len(sections) == 1 else None)
+            if section not in sections:
+                raise ValueError(f"strips: {name}: section: {strip.section!r} must be one of {', '.join(sections)}")
+            if strip.after is not None and strip.after not in found:
+                raise ValueError(
+                    f"strips: {name}: after: {strip.after!r} must be a strip before it: {', '.join(found) or 'none'}"
+                )
+            try:
+                found[name] = _member(section, strip, found)
+            except ValueError as error:
+                raise ValueError(f"strips: {name}: {error}") from error
+        return found
+
+    def _places(self) -> Iterator[tuple[str, str]]:
+        """Yield all places along strips that are named, and where."""
+        for name, joint in self.joints.items():
+            yield from ((f"joints: {name}", place) for place in joint.strips)
+        for number, actions in self.loads.items():
+            yield from ((f"loads: {number}", place) for place in actions if place not in self.joints)
+
+    def _load(self, number: str, actions: dict[str, ForceConfig], joints: dict[str, Joint], cuts, pieces) -> Load:
+        """Return a load; a place along a strip that is no joint becomes one."""
+        forces, moments = [], []
+        for place, action in actions.items():
+            name = place
+            if place not in self.joints:
+                ends = list(_ends_at(*_parsed(f"loads: {number}", place, self.strips), cuts, pieces))
+                name = re.sub(r"\W+", "_", place)
+                joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end in ends]))
+            if action.force is not None:
+                forces.append((name, action.force, action.arm))
+            else:
+                moments.append((name, action.moment))
+        return Load(forces, moments)
+
+    @property
+    def law_name(self) -> str:
+        return next(iter(self.strip().sections.values())).law.name
+
+    @property
+    def name(self) -> str:
+        """The network in words."""
+        count, joints = len(self.strips), len(self.joints)
+        return f"{count} strip{'s' * (count != 1)} ({self.law_name}), {joints} joint{'s' * (joints != 1)}"
+
+
+def _parsed(where: str, place: str, names) -> tuple[str, str | None, float | None]:
+    """Return strip, end and part of the length that words name."""
+    found = _PLACE.fullmatch(place)
+    if not found or found[1] not in names or (found[3] is not None and not 0 < float(found[3]) < 1):
+        raise ValueError(f"{where}: {place!r} must be {_PLACES}; strips are {', '.join(names)}")
+    return found[1], found[2], None if found[3] is None else float(found[3])
+
+
+def _ends_at(name: str, end: str | None, part: float | None, cuts, pieces) -> Iterator[tuple[str, str]]:
+    """Yield the ends of pieces at a place of a strip."""
+    parts = pieces.get(name, [name])
+    if end is not None:
+        yield (parts[0] if end == START else parts[-1]), end
+        return
+    number = sorted(cuts[name]).index(part)
+    yield parts[number], FINISH
+    yield parts[number + 1], START
+
+
+def _member(section: str, strip: StripConfig, before: dict[str, Member]) -> Member:
+    if strip.end is not None:
+        return straight(section, strip.begin, strip.end, strip.normal)
+    strains = (strip.bend / strip.length, 0.0, strip.twist / strip.length)
+    if strip.after is not None:
+        last = before[strip.after]
+        state = last.drawn([last.length])[0]
+        return Member(section, strip.length, tuple(map(float, state[4:])), tuple(map(float, state[:4])), strains)
+    tangent = np.array(strip.along)
+    normal = np.array(strip.normal) - tangent * (tangent @ strip.normal)
+    if np.linalg.norm(normal) < LOOSE:
+        raise ValueError(f"normal: {list(strip.normal)} lies along the strip")
+    normal /= np.linalg.norm(normal)
+    frame = quaternions(np.array([[np.cross(normal, tangent), normal, tangent]]))[0]
+    return Member(section, strip.length, strip.begin, tuple(map(float, frame)), strains)

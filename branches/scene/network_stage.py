@@ -1,0 +1,130 @@
+"""A stage of a network: from a labelled point of an earlier one, by default its end, to a value of the followed number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from branches.scene.fields import ConfigError
+from branches.scene.open_stage import OpenStage, newton_of
+from contin import ContinError, MeshControl, Point
+from contin.lowlevel import Collocation, Continuation
+from ribbon_model.ends import ANGLES
+from ribbon_model.network import ASSEMBLY, MOVES
+
+#: Axes of the drawing.
+_AXES = "xyz"
+
+
+class NetworkStage(OpenStage):
+    """A stage of a scene of a network."""
+
+    has_barriers = False
+
+    def __init__(self, scene, number: int):
+        super().__init__(scene, number)
+        self.head = f"{self.follow:>14s}     energy      {self.conjugate:>9s}      index   N  it"
+        self.units = "the units of the scene"
+        self._how = ""
+
+    # --- the run --------------------------------------------------------------------------------------------------------
+
+    def first(self) -> Point:
+        mesh = self.scene.mesh
+        try:
+            point, self._how = self.strip.first_point(
+                None, None, mesh.intervals, mesh.degree, mesh=self.mesh_control(), newton=newton_of(self.scene)
+            )
+        except (ContinError, ValueError) as error:
+            raise ConfigError(f"strips: no first state was found from the drawing: {error}") from error
+        return point
+
+    def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
+        values = {**origin.parameters, **numbers}
+        free = (self.follow, *self.problem.multipliers)
+        system = Collocation(self.problem, origin.system.mesh, origin.system.degree, free, values)
+        return system, system.pack(origin.system.states(origin.x), values)
+
+    def mesh_control(self) -> MeshControl:
+        mesh = self.scene.mesh
+        return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)
+
+    def notes(self, run: Continuation) -> list[str]:
+        notes = super().notes(run)
+        if self._how:
+            notes.insert(0, f"stage {self.number}: the first state was found {self._how}")
+        return notes
+
+    # --- columns --------------------------------------------------------------------------------------------------------
+
+    def found_names(self, numbers: Collection[str]) -> tuple[str, ...]:
+        network = self.strip
+        places = [f"{joint}_{axis}" for joint in network.joints for axis in _AXES]
+        reactions = [f"{kind}_{joint}_{axis}" for joint in network.held for kind in "FM" for axis in _AXES]
+        return ("potential", *places, *reactions, *(("floating",) if network.floats else ()))
+
+    def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
+        return {**point.parameters, **point.functionals, **self.found(point, np.empty(0))}
+
+    def found(self, point: Point, states: np.ndarray) -> dict[str, float]:
+        network = self.strip
+        found = {"potential": network.potential(point)}
+        for joint in network.joints:
+            found |= zip((f"{joint}_{axis}" for axis in _AXES), map(float, network.place(point, joint)))
+        for joint, parts in network.reactions(point).items():
+            if joint == "floating":
+                found[joint] = float(max(np.abs(part).max() for part in parts))
+                continue
+            for kind, part in zip("FM", parts):
+                found |= zip((f"{kind}_{joint}_{axis}" for axis in _AXES), map(float, part))
+        return found
+
+    # --- words ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def stiffness(self) -> float:
+        return min(section.stiffness for section in self.strip.sections.values())
+
+    def felt(self, name: str) -> str:
+        network = self.strip
+        if name in network.loads and network.loads[name].forces:
+            joint, direction, _ = network.loads[name].forces[0]
+            return f"{joint}_{_AXES[int(np.argmax(np.abs(direction)))]}"
+        joint, _, move = name.rpartition("_")
+        if move in MOVES and joint in network.held:
+            return f"F_{joint}_{move[1]}"
+        return "energy"
+
+    def told_values(self, point: Point) -> list[tuple[str, float]]:
+        value = self.found(point, np.empty(0)).get(self.conjugate, point["energy"])
+        return [(self.conjugate, value), ("energy", point["energy"])]
+
+    def words(self, name: str) -> tuple[str, str]:
+        network = self.strip
+        if name in network.loads:
+            return f"number of the load {name}", name
+        if name == ASSEMBLY:
+            return "part of the gaps and turns of joints that is closed", "assembly"
+        if name == "floating":
+            return "largest reaction to what holds the network that floats: an error", "reaction of what floats"
+        if name == "potential":
+            return "energy and the potential of all loads: the one of which the index is", "potential"
+        if name == "energy":
+            return "elastic energy, zero in the natural state, and potential of weight, pressure and field", "energy"
+        if found := re.fullmatch(r"([FM])_(\w+)_([xyz])", name):
+            kind = "force" if found[1] == "F" else "moment"
+            return f"{kind} on the network at {found[2]}, along {found[3]}", f"{kind} at {found[2]} along {found[3]}"
+        joint, _, last = name.rpartition("_")
+        if joint in network.joints and last in _AXES:
+            return f"place of {joint} along {last}", f"{last} of {joint}"
+        if joint in network.held and last in MOVES:
+            return f"prescribed displacement of {joint} along {last[1]}", f"displacement of {joint} along {last[1]}"
+        if joint in network.held and last in ANGLES:
+            return f"prescribed rotation of {joint}: {last}", f"{last} of {joint}"
+        number, _, section = name.rpartition("_")
+        if section in network.sections:
+            words, axis = super().words(number)
+            return f"{words}, of {section}", f"{axis}, {section}"
+        return super().words(name)
