@@ -140,6 +140,8 @@ class JointEnd:
         About which, on the axes of the drawing.
     arm : tuple of float
         From the end to the joint, on the directors of the end.
+    goes_on : bool
+        The strip goes on from the end before it: both are rigidly joined, of whatever kind the joint is.
     """
 
     member: str
@@ -147,6 +149,7 @@ class JointEnd:
     angle: float | str = 0.0
     axis: Vector = (1.0, 0.0, 0.0)
     arm: Vector = (0.0, 0.0, 0.0)
+    goes_on: bool = False
 
     def __post_init__(self) -> None:
         if self.end not in (START, FINISH):
@@ -417,11 +420,14 @@ class Network:
             found = [x.q0 * x.q0 + x.q1 * x.q1 + x.q2 * x.q2 + x.q3 * x.q3 - 1 for x in a]
             for name, joint in joints:
                 (first, origin), *others = readers[name](a, b, p)
+                before = first
                 for number, (frame, place) in enumerate(others, 1):
                     gap = gaps.get((name, number))
                     apart = [x - y for x, y in zip(place, origin)]
                     found += apart if gap is None else [x - (1 - p.assembly) * y for x, y in zip(apart, gap)]
-                    found += _together(joint, first, frame)
+                    goes_on = joint.members[number].goes_on
+                    found += _together(RIGID if goes_on else joint.kind, joint.axis, before if goes_on else first, frame)
+                    before = frame
             for name, frame_of, place_of, rotation, position in held:
                 frame, place = readers[name](a, b, p)[0]
                 found += [*rotation(frame, frame_of(p)), *position(place, place_of(p))]
@@ -706,14 +712,14 @@ def _known(what: str, name: str, names: Mapping) -> None:
         raise ValueError(f"{what}: {name!r} must be one of {', '.join(names) or 'none: there are none'}")
 
 
-def _together(joint: Joint, first, frame) -> list:
+def _together(kind: str, axis: Vector, first, frame) -> list:
     """Return what vanishes where two joint frames are together."""
-    if joint.kind == BALL:
+    if kind == BALL:
         return []
     turned = ends.relative(frame, first)[1:]
-    if joint.kind == RIGID:
+    if kind == RIGID:
         return list(turned)
-    pair = ends.perpendicular(ends.unit("axis", joint.axis))
+    pair = ends.perpendicular(ends.unit("axis", axis))
     return [sum(u * v for u, v in zip(vector, turned) if u != 0) for vector in pair]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.fields import StepConfig, Strict
-from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, numbers_of
+from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
 from ribbon_model.ends import DIRECTIONS, LOOSE
 from ribbon_model.network import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, Network, straight
 from ribbon_model.section import Section, section_of
@@ -149,6 +149,16 @@ class NetworkScene(StagedScene):
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _infinite(cls, values: Any) -> Any:
+        """Let B2 be infinite, which other numbers must not be."""
+        if not isinstance(values, dict):
+            return values
+        sections = values.get("sections")
+        found = {"sections": {name: finite(one) for name, one in sections.items()}} if isinstance(sections, dict) else {}
+        return values | found | ({"material": finite(values["material"])} if "material" in values else {})
+
     @model_validator(mode="after")
     def _fits(self):
         for names in (self.sections, self.strips, self.joints, self.loads):
@@ -184,9 +194,9 @@ class NetworkScene(StagedScene):
                 members.update(zip(pieces[name], member.cut(parts)))
         for name, joint in self.joints.items():
             ends = [
-                JointEnd(piece, end, joint.angle.get(place, 0.0), joint.about, joint.arm.get(place, (0.0, 0.0, 0.0)))
+                JointEnd(piece, end, joint.angle.get(place, 0.0), joint.about, joint.arm.get(place, (0.0, 0.0, 0.0)), goes_on)
                 for place in joint.strips
-                for piece, end in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
+                for piece, end, goes_on in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
             ]
             kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
             joints[name] = Joint(ends, kind, joint.hinge or DIRECTIONS["width"])
@@ -252,7 +262,7 @@ class NetworkScene(StagedScene):
             if place not in self.joints:
                 ends = list(_ends_at(*_parsed(f"loads: {number}", place, self.strips), cuts, pieces))
                 name = re.sub(r"\W+", "_", place)
-                joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end in ends]))
+                joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end, _ in ends]))
             if action.force is not None:
                 forces.append((name, action.force, action.arm))
             else:
@@ -278,15 +288,15 @@ def _parsed(where: str, place: str, names) -> tuple[str, str | None, float | Non
     return found[1], found[2], None if found[3] is None else float(found[3])
 
 
-def _ends_at(name: str, end: str | None, part: float | None, cuts, pieces) -> Iterator[tuple[str, str]]:
-    """Yield the ends of pieces at a place of a strip."""
+def _ends_at(name: str, end: str | None, part: float | None, cuts, pieces) -> Iterator[tuple[str, str, bool]]:
+    """Yield the ends of pieces at a place of a strip, and whether the strip goes on there from the one before."""
     parts = pieces.get(name, [name])
     if end is not None:
-        yield (parts[0] if end == START else parts[-1]), end
+        yield (parts[0] if end == START else parts[-1]), end, False
         return
     number = sorted(cuts[name]).index(part)
-    yield parts[number], FINISH
-    yield parts[number + 1], START
+    yield parts[number], FINISH, False
+    yield parts[number + 1], START, True
 
 
 def _member(section: str, strip: StripConfig, before: dict[str, Member]) -> Member:

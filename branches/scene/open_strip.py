@@ -316,10 +316,9 @@ class OpenScene(StagedScene):
     @classmethod
     def _infinite(cls, values: Any) -> Any:
         """Let B2 be infinite, which other numbers must not be."""
-        material = values.get("material") if isinstance(values, dict) else None
-        if isinstance(material, dict) and material.get("B2") == math.inf:
-            return {**values, "material": {**material, "B2": "inf"}}
-        return values
+        return (
+            values | {"material": finite(values["material"])} if isinstance(values, dict) and "material" in values else values
+        )
 
     @model_validator(mode="after")
     def _fits(self):
@@ -443,6 +442,11 @@ class OpenScene(StagedScene):
             twists = self.closed.half_twists
             return f"{law}, closed with {twists} half twist{'s' * (abs(twists) != 1)}"
         return f"{law}, {self.strip().start.words} and {self.strip().finish.words}"
+
+
+def finite(section: Any) -> Any:
+    """Return the fields of a section with an infinite B2 as text: other numbers must be finite."""
+    return section | {"B2": "inf"} if isinstance(section, dict) and section.get("B2") == math.inf else section
 
 
 def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:

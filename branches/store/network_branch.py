@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from branches.draw.shapes import flat_across
-from branches.draw.strip import OBLIQUE, View
+from branches.draw.strip import View
 from branches.store.files import StoreError
 from branches.store.open_branch import OpenBranch
 from ribbon_model.shape import Structure, shape_of
 
+#: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
+_VIEW = View(-62.0, 25.0)
 #: Width of drawn strips over the longest length, without dimensions.
 _WIDTH = 0.06
 
@@ -50,4 +52,4 @@ class NetworkBranch(OpenBranch):
 
     @property
     def view(self) -> View:
-        return OBLIQUE
+        return _VIEW
