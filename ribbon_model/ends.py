@@ -32,6 +32,8 @@ PLACE, ANGLES = ("shear", "rise", "distance"), ("turn", "bend", "swing")
 CLAMPED, HINGED, JOINT, FREE = "clamped", "hinged", "joint", "free"
 #: A part of a unit vector below this is zero.
 LOOSE = 1e-9
+#: A vector whose length differs from one by less has length one: it was divided by its length before.
+_ONE = 1e-15
 #: A vector shorter than this has no direction.
 _SHORT = 1e-9
 
@@ -50,6 +52,8 @@ def unit(what: str, vector) -> Vector:
     length = math.sqrt(sum(value * value for value in values))
     if len(values) != 3 or not _SHORT < length < math.inf:
         raise ValueError(f"{what}: {list(vector)} must be three numbers, not all zero")
+    if abs(length - 1) < _ONE:
+        return values  # type: ignore[return-value]
     return tuple(value / length for value in values)  # type: ignore[return-value]
 
 

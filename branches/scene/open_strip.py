@@ -17,7 +17,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
-from branches.scene.labels import START
 from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text
@@ -152,20 +151,14 @@ class DimensionsConfig(Strict):
         return self.youngs_modulus * self.thickness**3 * self.width / (12 * (1 - self.poisson_ratio**2))
 
 
-class FollowConfig(Strict):
-    """One stage: a number that is followed from a labelled point to a value."""
+class _Where(Strict):
+    """What a stage follows, and from where."""
 
     follow: str = Field(description="the number that is followed")
     to: float = Field(description="the value at which the stage ends")
     start_at: str | None = Field(None, description="labelled point to start from, as in BP 2 (the end of the stage before)")
     stage: int | None = Field(None, ge=1, description="number of the stage of that point (the one before)")
     way: Literal["forward", "backward"] = Field("forward", description="which of the two ways away from a branch point")
-    numbers: dict[str, float] = Field(default_factory=dict, description="numbers that the stage begins with (as before)")
-    max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
-    limits: dict[str, Interval] = Field(default_factory=dict)
-    label: dict[str, Annotated[list[float], Field(max_length=100)]] = Field(
-        default_factory=dict, description="values at which points are labelled UZ"
-    )
 
     @model_validator(mode="after")
     def _point(self):
@@ -178,15 +171,34 @@ class FollowConfig(Strict):
         if self.start_at is None:
             return len(labelled) - 1
         label, _, count = self.start_at.partition(" ")
-        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != START]
+        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != "start"]
         return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
 
 
-class StageConfig(FollowConfig):
-    """A stage of an open strip; from there on, the ends may be held otherwise."""
+class _Ends(Strict):
+    """What is held in a stage."""
 
     start: EndWords | None = Field(None, description="what is held at the first end from here on (as before)")
     finish: EndWords | None = Field(None, description="what is held at the last end from here on (as before)")
+
+
+class _How(Strict):
+    """With which numbers a stage begins, and how far it goes."""
+
+    numbers: dict[str, float] = Field(default_factory=dict, description="numbers that the stage begins with (as before)")
+    max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
+    limits: dict[str, Interval] = Field(default_factory=dict)
+    label: dict[str, Annotated[list[float], Field(max_length=100)]] = Field(
+        default_factory=dict, description="values at which points are labelled UZ"
+    )
+
+
+class FollowConfig(_How, _Where):
+    """One stage: a number that is followed from a labelled point to a value."""
+
+
+class StageConfig(_How, _Ends, _Where):
+    """A stage of an open strip; from there on, the ends may be held otherwise."""
 
 
 def _expression(value: Any) -> Any:

@@ -1,0 +1,203 @@
+"""Scenes of networks: their values against closed forms, their files, pictures and sentences."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import dump, load, parse
+from branches.store.files import StoreError
+
+ROD = "{law: rod, B1: 1.0, B2: 1.0, C: 0.75}"
+#: A cantilever in two pieces, with a load at its tip.
+CANTILEVER = f"""
+material: {ROD}
+strips:
+  a: {{begin: [0, 0, 0], end: [0, 0, 0.4], normal: [0, 1, 0]}}
+  b: {{after: a, length: 0.6}}
+joints:
+  A: [a start]
+  cut: [a finish, b start]
+  tip: [b finish]
+held: {{A: clamped}}
+loads:
+  P: {{tip: [0, 0, -1]}}
+stages:
+  - {{follow: P, to: 3.0}}
+"""
+
+
+@pytest.fixture
+def run(root, tmp_path):
+    def of(name_or_text):
+        scene = parse(name_or_text, "scene.yaml") if "\n" in name_or_text else load(root / "configs" / f"{name_or_text}.yaml")
+        path = tmp_path / "result.h5"
+        assert run_scene(scene, path, Display(silent=True), overwrite=True) == "complete"
+        return read_branch(path)
+
+    return of
+
+
+def _events(branch, label, name, stage=1):
+    rows = branch.events[(branch.events["label"] == label.encode()) & (branch.events["stage"] == stage)]
+    return [(float(row[name]), float(row[f"error_{name}"]), int(row["index_before"]), int(row["index_after"])) for row in rows]
+
+
+#: Scene, followed number, and the first special point of its first stage: closed forms, see tests/ribbon_model/test_network.py.
+KNOWN = {
+    "network_portal": ("P", "BP", 2.71645974768613**2, (0, 1)),
+    "network_right_angle": ("M", "BP", math.pi * math.sqrt(1.526717557251908 / 2), (0, 1)),
+    "network_ring_pressure": ("pressure", "BP", 3.0, (0, 1)),
+    "network_hexagon": ("kappa_n", "BP", 1.0088095252717388, (0, 2)),
+    "network_overcurved": (
+        "kappa_n", "BP",
+        2 * math.pi * (1 + (-(1 / 16 + 1 / 1.5) + math.sqrt((1 / 16 + 1 / 1.5) ** 2 + 12 / 24)) * 12), (0, 2),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_shipped_scenes_have_their_closed_forms(run, name):
+    number, label, known, change = KNOWN[name]
+    branch = run(name)
+    value, error, *changes = _events(branch, label, number)[0]
+    assert value == pytest.approx(known, abs=max(error, 1e-10))
+    assert error < 1e-9
+    assert tuple(changes) == change
+    if "floating" in branch.points.dtype.names:
+        assert branch.points["floating"].max() < 1e-7
+
+
+def test_the_portal_frame_in_all_stages(run):
+    """In its plane it sways at 2.716**2 = 7.379 and leaves it at (pi/2)**2 B2 = 9.870 (clamped columns, B2 = 4)."""
+    branch = run("network_portal")
+    (sway, *_), (out, *_) = _events(branch, "BP", "P")
+    assert sway == pytest.approx(2.71645974768613**2, abs=1e-10)
+    assert out == pytest.approx((math.pi / 2) ** 2 * 4, abs=1e-10)
+    assert np.ptp(branch.points["F_A_y"] + branch.points["F_D_y"] - 2 * branch.points["P"]) < 1e-8
+    assert branch.conjugate("P") == "B_y"
+
+
+def test_the_ring_under_pressure_touches_itself(run):
+    branch = run("network_ring_pressure")
+    last = branch.points[-1]
+    gap = math.dist([last[f"A_{x}"] for x in "xyz"], [last[f"B_{x}"] for x in "xyz"])
+    side = abs(last["side_y"] + 1)  # of the other branch, the sides come together: they move by the radius
+    assert (
+        gap == pytest.approx(0, abs=1e-8) or side == pytest.approx(0, abs=1e-8) or last["side_z"] == pytest.approx(0, abs=1e-8)
+    )
+
+
+def test_a_place_along_a_strip_is_a_joint(run):
+    """A load in the middle of a clamped strip is that of the strip in two pieces: half of the load at both ends."""
+    text = f"""
+material: {ROD}
+strips:
+  beam: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}
+joints: {{A: [beam start], B: [beam finish]}}
+held: {{A: clamped, B: {{rotation: clamped, slides_along: [0, 0, 1]}}}}
+loads:
+  P: {{beam at 0.5: [0, -1, 0]}}
+stages:
+  - {{follow: P, to: 1.0}}
+"""
+    branch = run(text)
+    last = branch.points[-1]
+    assert last["F_A_y"] == pytest.approx(0.5, abs=1e-9)
+    assert last["F_B_y"] == pytest.approx(0.5, abs=1e-9)
+    assert -last["beam_at_0_5_y"] == pytest.approx(1 / 192, rel=2e-3)  # P L^3 / 192 B for small loads
+
+
+def test_what_a_file_holds(run, tmp_path):
+    """Columns, words, shapes; the scene is written and read back; the picture has every member."""
+    branch = run(CANTILEVER)
+    assert parse(dump(branch.scene), "again") == branch.scene
+    shape = branch.shape(0)
+    assert len(shape.parts) == 2
+    assert shape.centreline[-1] == pytest.approx([0, 0, 1], abs=1e-12)
+    assert branch.columns.all["F_A_z"].words == "force on the network at A, along z"
+    assert _events(branch, "BP", "P")[0][0] == pytest.approx((math.pi / 2) ** 2, abs=1e-10)  # Euler's column, double
+    branch.plot(shapes=2).savefig(tmp_path / "picture.png")
+    with pytest.raises(StoreError, match="of a network"):
+        branch.strains(0)
+    with pytest.raises(StoreError, match="of a network"):
+        branch.placed(0, 1.0)
+
+
+def test_a_run_that_is_interrupted_goes_on(root, tmp_path, monkeypatch):
+    """Interrupted in its second stage and resumed, a scene gives the points of a run in one go, up to their errors."""
+    import branches.run.runner as runner
+
+    scene, whole, parts = load(root / "configs" / "network_portal.yaml"), tmp_path / "whole.h5", tmp_path / "parts.h5"
+    run_scene(scene, whole, Display(silent=True))
+
+    class Soon(runner.Interruption):
+        def __init__(self):
+            super().__init__(())
+            self._points = 0
+
+        @property
+        def asked(self):
+            self._points += 1
+            return self._points > 30
+
+        @asked.setter
+        def asked(self, value):
+            pass
+
+    with monkeypatch.context() as patched:
+        patched.setattr(runner, "Interruption", Soon)
+        assert run_scene(scene, parts, Display(silent=True)) == "interrupted"
+    assert run_scene(scene, parts, Display(silent=True), resume=True) == "complete"
+    one, other = read_branch(whole), read_branch(parts)
+    assert one.events["P"] == pytest.approx(other.events["P"], abs=1e-9)
+    assert one.events["energy"] == pytest.approx(other.events["energy"], abs=1e-9)
+
+
+def test_several_sections_and_a_sweep(run):
+    text = CANTILEVER.replace(f"material: {ROD}", f"sections: {{soft: {ROD}, stiff: {{law: rod, B1: 2.0, B2: 2.0, C: 2.0}}}}")
+    text = text.replace("a: {begin", "a: {section: soft, begin").replace("after: a,", "section: stiff, after: a,")
+    branch = run(text)
+    assert {"B1_soft", "kappa_n_stiff"} <= set(branch.points.dtype.names)
+    soft, stiff = 0.4, 0.6  # lengths; tan(k1 l1) tan(k2 l2) = k2 / k1 where the column of two parts buckles, k_i^2 = P / B_i
+    value = _events(branch, "BP", "P")[0][0]
+    k1, k2 = math.sqrt(value), math.sqrt(value / 2)
+    assert math.tan(k1 * soft) * math.tan(k2 * stiff) == pytest.approx(k2 / k1, abs=1e-8)
+    sweep = parse(text.replace("C: 0.75", "C: [0.75, 1.0]"), "sweep.yaml")
+    assert len(sweep.scenes) == 2
+
+
+MISTAKES = {
+    "strips: {a: {end: [0, 0, 1]}}": "strips.a: begin, after: give one of them",
+    "strips: {a: {begin: [0, 0, 0]}}": "strips.a: end, length: give one of them",
+    "strips: {a: {begin: [0, 0, 0], length: 1.0}}": "strips.a: along: is missing; a strip that begins at a place needs it",
+    "strips: {a: {begin: [0, 0, 0], end: [0, 0, 0], normal: [0, 1, 0]}}": "strips: a: a member from [0.0, 0.0, 0.0] to",
+    "strips: {a: {begin: [0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}": "strips.a.begin: must be three numbers, not [0, 0]",
+    "strips: {a: {after: b, length: 1.0}}": "strips: a: after: 'b' must be a strip before it: none",
+    "joints: {A: [a middle]}": "joints: A: 'a middle' must be a strip and start, finish or a part of its length",
+    "joints: {A: [c start]}": "joints: A: 'c start' must be a strip and",
+    "joints: {A: {strips: [a start], ball: true, hinge: [1, 0, 0]}}": "joints.A: hinge, ball: give one of them",
+    "held: {Z: clamped}": "held: 'Z' must be one of A, cut, tip",
+    "held: {A: welded}": "held.A: 'welded' must be clamped, hinged, ball joint, free",
+    "loads: {P: {tip: {moment: 1.0}}}": "loads: P: moments: tip must be held by a hinge",
+    "loads: {P: {tip: {force: [0, 0, 1], moment: 1.0}}}": "loads.P.tip: force, moment: give one of them",
+    "material: {B1: 1.0}": "material: the field 'law' is missing",
+    "material: {law: rubber}": "material: law: 'rubber' must be one of",
+    "stages: [{follow: Q, to: 1.0}]": "stage 1: follow: 'Q' must be one of the numbers here",
+    "stages: [{follow: P, to: 1.0, limits: {tip_w: [0, 1]}}]": "stage 1: 'tip_w'",
+}
+
+
+@pytest.mark.parametrize("change", MISTAKES)
+def test_a_mistake_is_one_sentence(change):
+    field = change.partition(":")[0]
+    text = re.sub(rf"^{field}:.*?(?=^\w|\Z)", change + "\n", CANTILEVER, flags=re.M | re.S)
+    with pytest.raises(ConfigError) as raised:
+        parse(text, "scene.yaml")
+    assert MISTAKES[change] in str(raised.value)
+    assert "\n" not in str(raised.value)
