@@ -40,6 +40,15 @@ def parser():
         help="largest time in seconds for each branch of a scene of many branches",
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
+    parser.add_argument(
+        "--search",
+        type=int,
+        nargs="?",
+        const=8,
+        metavar="N",
+        help="look for further states of an open strip where its stages end and at labelled values, from N random guesses "
+        "beside each known state (default: 8)",
+    )
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
     existing.add_argument("--resume", action="store_true", help="continue an unfinished result file; start if there is none")
@@ -70,9 +79,13 @@ def _run(options) -> int:
             raise ConfigError(f"--workers {options.workers}: must be at least 1")
         if not options.time_limit > 0:
             raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
+        if options.search is not None and not 1 <= options.search <= 1000:
+            raise ConfigError(f"--search {options.search}: must be from 1 to 1000")
         scene = load(options.config, options.set)
         for caution in next(iter(scene.scenes.values())).cautions:
             complain(f"caution: {caution}")
+        if options.search is not None and (scene.many or scene.KIND != "open strip"):
+            raise ConfigError("--search: is for a scene of one open strip")
         if scene.many:
             return _run_many(scene, options)
         path = output_path(options)
@@ -93,6 +106,8 @@ def _run(options) -> int:
 
     if outcome == "complete" and stages_of(scene)[0].has_barriers:
         _tell_barriers(path, display, options.quiet)
+    if outcome == "complete" and options.search is not None:
+        _tell_further(path, display, options)
     return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
 
 
@@ -107,6 +122,14 @@ def _tell_barriers(path, display, quiet: bool) -> None:
         lines = report(read_branch(path), quiet)
     if lines:
         display.note("\n".join(lines))
+
+
+def _tell_further(path, display, options) -> None:
+    """Print the states of an open strip that its stages do not reach."""
+    from branches.run.further import report
+    from branches.store.read import read_branch
+
+    display.note("\n".join(report(read_branch(path), options.search, options.quiet)))
 
 
 def _run_many(sweep, options) -> int:

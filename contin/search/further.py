@@ -5,7 +5,7 @@ At each value:
 1. Collect the solutions that are known there, of all branches followed so far; those under symmetries count as known.
 2. Start the deflated iteration (`contin.search.deflation`) from one guess after the other, from each until it finds nothing:
    guesses that are given, states of branches at other values, known states with the sign reversed, their images under given
-   maps, and with random perturbations.
+   maps, and with random perturbations. Where it does not converge, take damped Newton steps from the guess itself.
 3. Correct what it finds, adapt the mesh, and compare it with all that is known. The caller follows each new one both ways; its
    branch is known from then on, and its states at this value are guesses, too.
 """
@@ -27,10 +27,13 @@ from contin.core.settings import Settings
 from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.names import exact_text
+from contin.problems.statement import declared
 from contin.results.point import Point
+from contin.results.record import system_of
 from contin.search.deflation import SAME, deflated
 from contin.search.guess import Guess, Options, first_guess
 from contin.search.images import Symmetry, are_one, check_maps, evenly, image
+from contin.search.lagrange import with_guessed_multipliers
 from contin.search.solving import solved
 
 #: Longest step of a deflated iteration, relative to 1 + |x|. Of the eight solutions of Carrier's equation at 1/5, steps of .3
@@ -51,7 +54,8 @@ class Search:
     Attributes
     ----------
     values : sequence of float
-        Of the primary parameter, inside its limits. All branches of the diagram have a point (UZ) there.
+        Of the primary parameter, inside its limits. All branches of the diagram have a point (UZ) there. Not of
+        `contin.lowlevel.further`.
     sizes : sequence of float
         Sizes of random perturbations of known states, relative to 1 + the size of each state.
     draws : int
@@ -81,7 +85,7 @@ class Search:
     ([0.5, 1.5], 'closed')
     """
 
-    values: Sequence[float]
+    values: Sequence[float] = ()
     sizes: Sequence[float] = (0.1, 1.0)
     draws: int = 4
     guesses: Sequence[Any] = ()
@@ -240,10 +244,10 @@ class Site:
             states = np.arange(x.size) < system.state_size
             yield "reversed", system, np.where(states, -x, x)
             for each in search.maps:
-                yield "mapped", system, _mapped(system, each, x)
+                yield "mapped", system, _fitted(system, _mapped(system, each, x))
             for size in search.sizes:
                 for _ in range(search.draws):
-                    yield "random", system, x + size * _perturbation(system, x, random)
+                    yield "random", system, _fitted(system, x + size * _perturbation(system, x, random))
 
     def held(self, point: Point) -> tuple[System, Array]:
         """Return the system of a point with the primary parameter held at the value, and the point for it."""
@@ -259,19 +263,19 @@ class Site:
         return first_guess(problem, guess, Options(values, system.free, max(system.intervals, 1), system.degree))
 
     def _beside(self, system: System, x: Array, account: Searched) -> Point | None:
-        """Return a solution that is not known, which the deflated iteration finds from x; None where it finds none."""
+        """Return a solution that is not known, from the deflated iteration or, where that finds none, damped steps from x."""
+        roots = self._roots(system)
         with np.errstate(all="ignore"):
-            found = deflated(system, x, self._roots(system), _LONGEST)
-            point = None
-            if found is not None:
+            for start in (deflated(system, x, roots, _LONGEST), x):
+                if start is None:
+                    continue
                 with contextlib.suppress(ConvergenceError, ProblemError):
-                    point = solved(system, found, self.settings.mesh, self.settings.newton)
-        if point is None:
-            account.lost += 1
-        elif self.knows(point):
-            account.known_again += 1
-        else:
-            return point
+                    point = solved(system, start, self.settings.mesh, self.settings.newton)
+                    if not self.knows(point):
+                        return point
+                    account.known_again += 1
+                    return None
+        account.lost += 1
         return None
 
     def _roots(self, system: System) -> list[Array]:
@@ -288,11 +292,65 @@ class Site:
         return roots
 
 
+@checks.arguments
+def further(
+    known: Sequence[Point], name: str, search: Search | None = None, settings: Settings | None = None, *,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5,
+) -> Searched:  # fmt: skip
+    """Search for further solutions at the parameters of known ones, without following any.
+
+    Parameters
+    ----------
+    known : sequence of Point
+        At least one; all have the same parameters.
+    name : str
+        A parameter that is held: the account names it with its value.
+    search : Search, optional
+    settings : Settings, optional
+        Of Newton's method and the mesh.
+    symmetries, tolerance :
+        As of `contin.diagram`; the symmetries that the problem declares count, too.
+
+    Raises
+    ------
+    ProblemError
+        No known solution, or a name that is no parameter.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve
+    >>> cubic = AlgebraicProblem(lambda u, p: (u.x**3 - p.a * u.x,), ["x"], {"a": 4.0})
+    >>> account = further([solve(cubic, [0.0])], "a")
+    >>> sorted(round(point["x"], 9) for point in account.found)
+    [-2.0, 2.0]
+    """
+    if not known:
+        raise ProblemError("known: must be at least one solution")
+    problem = system_of(known[0], "known").problem
+    checks.chosen("name", [name], tuple(problem.parameters))
+    check_maps("symmetries", symmetries)
+    checks.number("tolerance", tolerance, 0)
+    maps: list[Symmetry] = [lambda t, u: u, *symmetries, *declared(problem, "symmetries").values()]
+    site = Site(name, known[0][name], settings or Settings(), maps, tolerance)
+    site.add_from(known)
+    return site.search(search or Search(), (), 0, lambda point, account: None)
+
+
 def _mapped(system: System, each: Symmetry, x: Array) -> Array:
     """Return the image of a solution under a map, which is applied on a uniform mesh."""
     even = evenly(system)
     mapped: Array = even.carrier(system)(image(even, each, system.carrier(even)(x)))
     return mapped
+
+
+def _fitted(system: Any, x: Array) -> Array:
+    """Return a guess with the multipliers that fit its states best, of a variational problem."""
+    problem = system.problem
+    if problem.dimension == len(problem.state_names):
+        return x
+    with contextlib.suppress(ProblemError):  # the energy has no finite value there
+        return with_guessed_multipliers(system, system.states(x)[:, : problem.dimension])
+    return x
 
 
 def _perturbation(system: System, x: Array, random: np.random.Generator) -> Array:

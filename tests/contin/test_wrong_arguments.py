@@ -87,6 +87,7 @@ def calls(tmp_path_factory):
         }),
         "Search": (contin.Search, {"values": [1.0]}),
         "Settings": (contin.Settings, {}), "MeshControl": (contin.MeshControl, {}), "Newton": (contin.Newton, {}),
+        "further": (lowlevel.further, {"known": [start], "name": "a", "settings": FEW}),
         "gradient": (lowlevel.gradient, {"function": lambda x: x**2, "by": ["x"]}),
         "minimum": (lowlevel.minimum, {"potential": lambda w: w[0] ** 2, "start": [1.0]}),
         "root": (lowlevel.root, {"residual": lambda w: (w[0],), "start": [1.0]}),

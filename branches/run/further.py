@@ -1,0 +1,104 @@
+"""Further states of open strips: those with the ends and numbers of a result that none of its branches reaches (deflation).
+
+They are looked for where a stage ends, and at the values that the scene labels. All states of the result there count as known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from branches.run.barriers import State, states_at
+from branches.run.progress import Progress
+from branches.scene.labels import begins
+from branches.store.open_branch import OpenBranch
+from contin import ContinError, MeshControl, Search, Settings
+from contin.lowlevel import Searched, exact_text, further
+
+#: Size of random perturbations: half waves and constants of about one in all states. Of the strip of open_clamped.yaml at 75 %,
+#: eight of them beside each state find eight further states, of size .3 one, of size 2 one.
+SIZES = (1.0,)
+#: Energies that differ by less, relative to 1 + their size, are one: the state is an image of a known one, in most cases.
+_EQUAL = 1e-7
+#: Further states at one place after which the search there ends: some strips have very many.
+MOST = 10
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place of a result, the states that it knows there, further ones in the order of their potential, and the account."""
+
+    stage: int
+    column: str
+    value: float
+    known: list[State]
+    found: list[State]
+    account: Searched
+
+
+def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
+    """Return the search at each place; ``draws`` is the number of perturbations of each size, for every known state."""
+    found = []
+    rows = list(_rows(branch))
+    with Progress("places searched", len(rows), quiet) as progress:
+        for row in rows:
+            stage = int(branch.points["stage"][row])
+            column = branch.followed(stage)
+            known = states_at(branch, row)
+            if known:
+                progress.part(column)
+                found.append(_searched(branch, row, known, draws))
+            progress.part_done()
+    return found
+
+
+def _rows(branch: OpenBranch) -> Iterator[int]:
+    """Yield the points at ends of stages and labelled values, each set of numbers once."""
+    seen: list[int] = []
+    for event in branch.events:
+        row = int(event["point"])
+        if not begins(event) and event["label"] in (b"EP", b"UZ") and not any(branch.same_strip(row, other) for other in seen):
+            seen.append(row)
+            yield row
+
+
+def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> Place:
+    stage = int(branch.points["stage"][row])
+    column, strip, mesh = branch.followed(stage), known[0].strip, branch.scene.mesh
+    control = MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals)
+    search = Search(sizes=SIZES, draws=draws, most=MOST)
+    account = further([state.point for state in known], column, search, Settings(mesh=control))
+    found = []
+    for point in account.found:
+        try:
+            index = point.second_variation().index()
+        except ContinError:
+            index = -1
+        found.append(State("", strip, point, index, strip.potential(point)))
+    return Place(stage, column, known[0].point[column], known, sorted(found, key=lambda state: state.potential), account)
+
+
+def report(branch: OpenBranch, draws: int, quiet: bool = True) -> list[str]:
+    """Return what a run prints of the search."""
+    factor, unit = branch.scene.factor("potential"), branch.scene.unit("potential")
+    lines = [f"further states{f', energies in {unit}' if unit else ''}:"]
+    for place in places(branch, draws, quiet):
+        value = exact_text(float(f"{place.value * branch.scene.factor(place.column):.6g}"))
+        where = f"{place.column} = {value} {branch.scene.unit(place.column)}".rstrip()
+        tried = f"{place.account.guesses.total()} guesses; {place.account.stop}"
+        lines.append(f"  {where} of stage {place.stage}: {len(place.known)} known, {len(place.found)} more ({tried})")
+        energies = [state.potential for state in place.known]
+        lines += [
+            f"    energy {state.potential * factor:.6g}{_image(state.potential, energies)}, index {_words(state.index)}"
+            for state in place.found
+        ]
+    return [*lines, "  what no guess leads to is not found: there may be more"]
+
+
+def _image(energy: float, known: list[float]) -> str:
+    """Return words for a state with the energy of a known one."""
+    return " (that of a known state)" if any(abs(energy - one) <= _EQUAL * (1 + abs(one)) for one in known) else ""
+
+
+def _words(index: int) -> str:
+    return "unknown" if index < 0 else str(index)
