@@ -22,14 +22,15 @@ from .results.columns import StoredColumns, read_columns
 from .results.cubic import hermite, through
 from .results.phase_response import PhaseResponse
 from .results.point import point_of
+from .results.spectrum import Spectrum
 from .search.further import Searched, further
 from .search.trace import follow
 from .shown import shown
 
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE",
-    "PhaseResponse", "Searched", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis", "cache_directory",
-    "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite", "interpolation", "least",
-    "locate_branch_point", "minimum", "point_of", "read_columns", "root", "shown", "temporary_name", "through",
-    "write_whole",
+    "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
+    "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
+    "interpolation", "least", "locate_branch_point", "minimum", "point_of", "read_columns", "root", "shown",
+    "temporary_name", "through", "write_whole",
 ]  # fmt: skip

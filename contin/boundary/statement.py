@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
 from contin import checks
 from contin.arrays import Array, Function, Places
+from contin.boundary.fields import Fields
 from contin.boundary.system import Collocation
 from contin.collocation.degree import usual_degree
 from contin.core.scales import Scales
@@ -52,6 +54,10 @@ class BoundaryValueProblem(Restated):
     phases : sequence of str, optional
         Names of parameters, or of states, that are zero where phase conditions hold by symmetry: the unfolding numbers that
         make the equations as many as the unknowns. A run notes labelled points at which they are not zero.
+    rates : mapping of str to callable, optional
+        Of steady states of fields that move in time: ``rates={"v": f}`` says that the equation of the state v is v' = rhs +
+        f(t, u, w, p), linear in the rates in time w of the states (``w.u`` is u_t). Points are then stable or not, Hopf points
+        are looked for, and `Point.spectrum` returns eigenvalues. The first free parameter is held in time.
 
     Raises
     ------
@@ -85,6 +91,7 @@ class BoundaryValueProblem(Restated):
     boundary_count: int | None = None
     integral_count: int | None = None
     phases: Sequence[str] = ()
+    rates: Mapping[str, Function] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._keep(states=check_statement(self.states, self.parameters, self.functionals))
@@ -97,13 +104,18 @@ class BoundaryValueProblem(Restated):
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
         known = (*self.parameters, *self.state_names)
         self._keep(phases=checks.chosen("phases", self.phases, known))
+        for name, function in checks.mapping("rates", self.rates, "functions").items():
+            checks.chosen("rates", [name], self.state_names)
+            if argument_count(checks.function(f"rates: {name}", function)) != 4:
+                raise ProblemError(f"rates: {name} must be a function of 4 arguments, (t, u, w, p)")
 
     def discretized(
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
         degree: int = 0,
     ) -> Collocation:  # fmt: skip
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
-        return Collocation(self, mesh, degree, free, parameters, scales)
+        kind = Fields if self.rates else Collocation
+        return kind(self, mesh, degree, free, parameters, scales)
 
     def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states for one that a user gives."""
@@ -140,6 +152,16 @@ class BoundaryValueProblem(Restated):
         return cast(tuple[str, ...], self.states)
 
     @property
+    def dynamics(self) -> bool:  # type: ignore[override]  # an attribute of the kinds that are of one kind only
+        """The states move in time: solutions are steady."""
+        return bool(self.rates)
+
+    @property
+    def rate_rows(self) -> list[int]:
+        """Places of the states whose equations contain rates in time."""
+        return [self.state_names.index(name) for name in self.rates]
+
+    @property
     def boundary_size(self) -> int:
         """n_bc, the number of boundary conditions."""
         return self._counts["boundary"]
@@ -155,13 +177,14 @@ class BoundaryValueProblem(Restated):
         return self.boundary_size + self.integral_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
-        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
+        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"``, ``"functionals"`` or ``"rates"``; made when
+        first asked. The states of the last one are those of the problem and, behind them, their rates."""
         if name not in self._batches:
             self._batches[name] = self._compiled(name)
         return self._batches[name]
 
     def _groups(self) -> list[str]:
-        return ["field", "boundary", *(["functionals"] if self.functionals else [])]
+        return ["field", "boundary", *(name for name in ("functionals", "rates") if getattr(self, name))]
 
     def equations(self) -> str:
         """Return the equations and conditions as text, as they were recorded or derived.
@@ -195,8 +218,9 @@ class BoundaryValueProblem(Restated):
 
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
-        point = self._of_point.arguments
-        return {"rhs": point, "boundary": self._of_ends.arguments, "integrals": point, "functionals": point}
+        point, u = self._of_point.arguments, self.state_names
+        ends, rates = self._of_ends.arguments, [None, u, u, tuple(self.parameters)]
+        return {"rhs": point, "boundary": ends, "integrals": point, "functionals": point, "rates": rates}
 
     @property
     def _of_point(self) -> Signature:
@@ -231,6 +255,9 @@ class BoundaryValueProblem(Restated):
             if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
                 raise ProblemError("functionals: each must be f(t, u, p) and return one number")
             return Batch(functions, [0] * len(functions), u, p)
+        if name == "rates":
+            taken = [_of_both(function, u) for function in self.rates.values()]
+            return Batch(taken, [0] * len(taken), [f"{kind}{i}" for kind in "uw" for i in range(len(u))], p)
         functions = [f for f in (self.rhs, self.integrals) if f is not None]
         sizes = (len(u), self.integral_size)
         shapes = [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)]
@@ -257,6 +284,17 @@ def _value_count(name: str, function: Function | None, signature: Signature, giv
         raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
     checks.whole(f"{name.rstrip('s')}_count", given, 1, MOST_CONDITIONS)
     return given
+
+
+def _of_both(function: Function, names: Sequence[str]) -> Function:
+    """Return a function of t, states, rates and parameters as one of t, states with the rates behind them, and parameters."""
+    states: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
+
+    def of_both(t: Any, both: Any, p: Any) -> Any:
+        values = list(both)
+        return function(t, states(*values[: len(names)]), states(*values[len(names) :]), p)
+
+    return of_both
 
 
 def _shape(function: Function, signature: Signature, size: int) -> int:

@@ -21,7 +21,7 @@ from contin.errors import ProblemError
 from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the mesh.
-_ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies")
+_ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies", "_spectra_found")
 
 
 class OnMesh(System):

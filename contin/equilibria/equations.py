@@ -13,6 +13,7 @@ from contin.collocation.mesh import MeshControl
 from contin.core.protocol import Carrier, Discretization
 from contin.core.rounding import may_be_on_axis, off_axis
 from contin.core.scales import Scales, usual
+from contin.core.spectral import Spectral
 from contin.core.system import System
 from contin.equilibria.given import check_given
 from contin.functions.batch import Batch, Columns
@@ -23,7 +24,7 @@ from contin.linalg.sparse import SparseFactors
 from contin.problems.angles import whole_rounds
 
 
-class AlgebraicEquations(System):
+class AlgebraicEquations(Spectral, System):
     """F(u, p) = 0 with chosen free parameters: the equations of an `Algebraic`."""
 
     intervals = 0
@@ -44,7 +45,6 @@ class AlgebraicEquations(System):
         self.size = self.state_size + len(self.free)
         self.equations = problem.equation_size
         self.weights = np.ones(self.size)
-        self._found: dict[bytes, tuple[ComplexArray, ComplexArray]] = {}
         self._none = np.empty((0, self.state_size))  # the absent second state of functions of one point
 
     @property
@@ -241,24 +241,6 @@ class AlgebraicEquations(System):
             return self
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
-    def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the eigenvalues of F_u, complex: the stability of the equilibrium of u' = F.
-
-        All n of them or, of a matrix that is kept sparse, those right of the imaginary axis or near to it.
-        """
-        return self._eigenvalues(x)[0]
-
-    def computed_eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the eigenvalues with their round-off, where a zero of a real part is located."""
-        return self._eigenvalues(x)[1]
-
-    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
-        """Return the eigenvalues at several places; those of small matrices are computed together."""
-        new = [x for x in places if x.tobytes() not in self._found]
-        for x, found in zip(new, self.spectra(new) if new else ()):
-            self._keep(x.tobytes(), found)
-        return [self.eigenvalues(x) for x in places]
-
     def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
         """Return the eigenvalues at places: those of pairs on the axis up to round-off with the real part 0, and as computed.
 
@@ -275,18 +257,6 @@ class AlgebraicEquations(System):
             return [(values, values) for values in found]
         return [(off_axis(eigenvalues, matrix, values), values) for matrix, values in zip(matrices, found)]
 
-    def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
-        if len(self._found) > _KEPT:
-            del self._found[next(iter(self._found))]
-        self._found[key] = found
-
-    def _eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
-        key = x.tobytes()
-        if key not in self._found:
-            self._keep(key, self.spectra([x])[0])
-        return self._found[key]
-
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
         if not self.is_sparse:
@@ -300,10 +270,6 @@ class AlgebraicEquations(System):
             return nearest(self.as_field().field_jacobian(x), value)
         values = self.eigenvalues(x)
         return complex(values[np.argmin(np.abs(values - value))])
-
-    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
-        """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
-        return "HB", "Hopf"
 
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals, in their order."""
@@ -380,8 +346,6 @@ class AlgebraicEquations(System):
 _MANY = 200
 #: Largest part of its entries that may differ from zero.
 _FEW = 0.1
-#: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
-_KEPT = 64
 #: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
 _SYMMETRIC = 1e-13
 #: The t of functions that do not take it.

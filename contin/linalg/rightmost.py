@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -53,16 +54,35 @@ def rightmost(matrix: Any, solver: Function | None = None) -> ComplexArray:
     matrix = csc_array(matrix, dtype=float)
     if not np.isfinite(matrix.data).all():
         return np.full(2, np.nan, dtype=complex)
-    one = eye_array(matrix.shape[0], format="csc")
-    size = float(abs(matrix).sum(axis=0).max())
-    found = [_transformed(factor, matrix, one, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
+    n, size = matrix.shape[0], float(abs(matrix).sum(axis=0).max())
+    one = eye_array(n, format="csc")
+
+    def inverse(pole: float) -> Function:
+        factors = factor(matrix - pole * one)
+        return lambda v: factors.solve(v, "N")
+
+    return rightmost_of(inverse, n, size, size)
+
+
+def rightmost_of(inverse: Function, n: int, size: float, largest: float = math.inf) -> ComplexArray:
+    """Return the same eigenvalues of an operator A that is known by its inverses, as in `rightmost`.
+
+    Parameters
+    ----------
+    inverse : callable
+        ``inverse(s)`` returns the function v -> (A - s)^-1 v of vectors (n,); it raises RuntimeError where there is none.
+    n : int
+    size, largest : float
+        A size of A: zero is looked at from a billionth of it. The largest shift.
+    """
+    found = [_transformed(inverse, n, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
     scale = float(np.abs(found[0]).max(initial=0.0)) or 1.0
     for share in _SHIFTS:
-        shift, count = min(share * scale, size), _COUNT
-        found.append(_transformed(factor, matrix, one, shift, (1 + 2 * _STRIP) * shift))
-        while np.all(found[-1].real > 0) and found[-1].size and 2 * count < matrix.shape[0]:  # there may be more
+        shift, count = min(share * scale, largest), _COUNT
+        found.append(_transformed(inverse, n, shift, (1 + 2 * _STRIP) * shift))
+        while np.all(found[-1].real > 0) and found[-1].size and 2 * count < n:  # there may be more
             count *= 2
-            found.append(_transformed(factor, matrix, one, shift, (1 + 2 * _STRIP) * shift, count))
+            found.append(_transformed(inverse, n, shift, (1 + 2 * _STRIP) * shift, count))
     return _distinct(np.concatenate(found))
 
 
@@ -76,35 +96,40 @@ def nearest(matrix: Any, value: complex) -> complex:
     (7+0j)
     """
     from scipy.sparse import csc_array, eye_array
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+    from scipy.sparse.linalg import splu
 
     n = matrix.shape[0]
     shifted = csc_array(matrix, dtype=complex) - complex(value) * eye_array(n, format="csc")
     if not np.isfinite(shifted.data).all():
         return complex("nan")
+    return nearest_of(lambda _: splu(shifted).solve, n, value)
+
+
+def nearest_of(inverse: Function, n: int, value: complex) -> complex:
+    """Return the same of an operator A that is known by its inverses: ``inverse(s)`` is the function v -> (A - s)^-1 v."""
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+
     start = np.random.default_rng(11).standard_normal(n).astype(complex)
     try:
-        factors = splu(shifted)
+        operator = LinearOperator((n, n), inverse(complex(value)), dtype=complex)
     except RuntimeError:  # exactly singular
         return complex(value)
-    inverse = LinearOperator((n, n), factors.solve, dtype=complex)
     try:
-        found = eigs(inverse, 1, v0=start, tol=_TOLERANCE, return_eigenvectors=False)
+        found = eigs(operator, 1, v0=start, tol=_TOLERANCE, return_eigenvectors=False)
     except ArpackError:
         return complex("nan")
     return complex(value + 1 / found[0])
 
 
-def _transformed(factor: Function, matrix: Any, one: Any, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
+def _transformed(inverse: Function, n: int, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
     """Return the eigenvalues z of largest |(z + zero) / (z - pole)|, or of largest 1 / |z - pole| without a zero."""
     from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
-    n = matrix.shape[0]
     try:
-        factors, after = factor(matrix - pole * one), matrix + zero * one
+        solve = inverse(pole)
     except RuntimeError:  # exactly singular
         return np.empty(0, dtype=complex)
-    operator = LinearOperator((n, n), lambda v: factors.solve(after @ v if zero else v, "N"), dtype=float)
+    operator = LinearOperator((n, n), lambda v: v + (pole + zero) * solve(v) if zero else solve(v), dtype=float)
     start = np.random.default_rng(11).standard_normal(n)
     options = {"ncv": min(_SPACE * count, n), "maxiter": _RESTARTS, "tol": _TOLERANCE, "return_eigenvectors": False}
     try:

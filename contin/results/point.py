@@ -28,6 +28,7 @@ from contin.results.sensitivity import sensitivities
 if TYPE_CHECKING:
     from contin.cycles.floquet import Floquet
     from contin.results.phase_response import PhaseResponse
+    from contin.results.spectrum import Spectrum
 
 #: So many columns stand in the representation of a point.
 _SHOWN = 8
@@ -328,6 +329,29 @@ class Point(Record):
 
         fold = self.label == Label.FOLD and self.column != PERIOD and not self.system.on_curve
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
+
+    def spectrum(self) -> Spectrum:
+        """Return the eigenvalues that decide on the stability of a steady state in time, with estimates of their errors.
+
+        That is one of an `AlgebraicProblem`, or of a `BoundaryValueProblem` with ``rates``. On curves in two parameters they
+        are those of the solution at this point of the curve.
+
+        Raises
+        ------
+        ProblemError
+            The states do not move in time.
+
+        Examples
+        --------
+        >>> import contin
+        >>> pendulum = contin.AlgebraicProblem(lambda u, p: (u.v, -u.x - p.drag * u.v), ["x", "v"], {"drag": 2.5})
+        >>> spectrum = contin.solve(pendulum, [0.1, 0.0]).spectrum()
+        >>> spectrum.values.real.round(9).tolist(), spectrum.stable
+        ([-0.5, -2.0], True)
+        """
+        from contin.results.spectrum import Spectrum  # as `floquet`
+
+        return Spectrum(self)
 
     def phase_response(self) -> PhaseResponse:
         """Return the phase response of a cycle: its adjoint Z, with Z.F = 1, by one solve with a transposed matrix.

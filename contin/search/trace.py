@@ -174,6 +174,11 @@ def _tangent(start: Point, system: Discretization, branch: int) -> Array:
     """
     known = finding_of(start.details)
     if not known.is_branch_point:
+        if branch == 1 and start.label == Label.HOPF and start.system.intervals and not start.system.is_cycle:
+            raise ProblemError(
+                "branch: time-periodic states of a field begin at this Hopf point, and are not followed; replace derivatives "
+                "by x with differences, and state the values at nodes as an AlgebraicProblem: its Hopf points start cycles"
+            )
         first = "0 or 1" if switches(start) else "0"
         labelled = f"a point labelled {start.label or 'nothing'!r}"
         raise ProblemError(f"branch: {branch} must be {first} at {labelled}; other branches begin at BP, HB and PD")

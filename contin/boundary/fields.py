@@ -1,0 +1,218 @@
+"""Steady states of fields over one coordinate: boundary value problems of which some equations contain rates in time.
+
+With U' = rhs(t, U, p) + M U_t, where M (n, n) has entries in the rows of a few equations only, a perturbation that grows as
+exp(z t) solves, on the mesh of the steady state,
+
+    A v = z B v,        B = P S,
+
+A being the matrix of the collocation equations and conditions at fixed parameters. S v (m,) are the rates M v at the Gauss
+points, times the length of the interval, and P puts them into the rows of these equations. Most of B is zero, and with it most
+eigenvalues of the pair are infinite. With a shift s,
+
+    T(s) = S (A - s B)^-1 P,        T(s) w = w / (z - s),
+
+has the finite ones alone. Of meshes that are not long T is formed, and all its eigenvalues are found; otherwise those right of
+the imaginary axis, or near to it, by Arnoldi's method (`contin.linalg.rightmost`).
+
+Collocation at Gauss points makes no unstable eigenvalues of its own: of u_t = u_xx it replaces exp(h sqrt z) over an interval h
+by a diagonal Pade approximant, which has the modulus 1 on the imaginary axis only, so that all z are negative on any mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray, Function
+from contin.boundary.system import Collocation
+from contin.core.spectral import Spectral
+from contin.core.trial import Event
+from contin.errors import ProblemError
+from contin.events.hopf import hopf
+from contin.linalg.rightmost import nearest_of, rightmost_of
+
+#: Most rates at Gauss points for which T is formed: its eigenvalues take 0.15 s then.
+_DENSE = 300
+#: Eigenvalues that are kept, those furthest to the right, besides all that are unstable. Fewer than ten would leave out
+#: pairs that move to the axis over one step.
+_KEPT = 24
+#: Eigenvalues of T below this part of the largest are round-off: z is larger than the shift by the inverse of that.
+_INFINITE = 1e-10
+#: The shift is this multiple of a bound on the rates that the equations without derivatives allow: an eigenvalue that is equal
+#: to the bound, as that of a uniform state, is not the shift.
+_BEYOND = 1.37
+#: Rates that are no linear functions of those of the states differ from these by more, relative to their size.
+_LINEAR = 1e-9
+
+
+#: Entries of a matrix, and their rows and columns.
+Entries = tuple[Array, Any, Any]
+
+
+class Pencil(NamedTuple):
+    """The matrices A, P and S, sparse, and the shift s of `Fields.spectra`."""
+
+    matrix: Any
+    into: Any
+    rates: Any
+    shift: float
+
+
+class Fields(Spectral, Collocation):
+    """A `BoundaryValueProblem` with ``rates`` on a mesh."""
+
+    plain = False
+
+    def events(self) -> list[Event]:
+        """Return also that of Hopf points."""
+        return [*super().events(), hopf()]
+
+    @property
+    def is_sparse(self) -> bool:
+        """Not all eigenvalues are computed: the mesh is long."""
+        return self.gauss_times.size * len(self.problem.rate_rows) > _DENSE
+
+    def unstable(self, x: Array) -> int:
+        """Return the number of unstable eigenvalues."""
+        return int(np.count_nonzero(self.eigenvalues(x).real > 0))
+
+    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
+        """Return the eigenvalues at places, those furthest to the right first, twice."""
+        found = [self._rightmost(x) for x in places]
+        return [(values, values) for values in found]
+
+    def eigenvalue_near(self, x: Array, value: complex) -> complex:
+        """Return the eigenvalue that is nearest to a value; NaN where none is found."""
+        pencil = self.pencil(x)
+        if not np.isfinite(pencil.matrix.data).all():
+            return complex("nan")
+        return nearest_of(_inverse(pencil, complex), pencil.into.shape[1], value)
+
+    def _rightmost(self, x: Array) -> ComplexArray:
+        pencil = self.pencil(x)
+        if not (np.isfinite(pencil.matrix.data).all() and np.isfinite(pencil.rates.data).all()):
+            return np.full(2, np.nan, dtype=complex)
+        count, inverse = pencil.into.shape[1], _inverse(pencil, float)
+        if self.is_sparse:
+            found = rightmost_of(inverse, count, pencil.shift)
+        else:
+            try:
+                values = np.linalg.eigvals(inverse(pencil.shift)(np.eye(count)))
+            except RuntimeError:  # no shift has an inverse
+                return np.full(2, np.nan, dtype=complex)
+            finite = values[np.abs(values) > _INFINITE * np.abs(values).max(initial=0.0)]
+            found = pencil.shift + 1 / finite
+        found = found[np.lexsort((-found.imag, -found.real))]
+        kept = max(_KEPT, 2 + int(np.count_nonzero(found.real > 0)))
+        if kept < len(found) and found[kept].imag < 0:
+            kept += 1  # the conjugate of the last one
+        return found[:kept].astype(complex)
+
+    def pencil(self, x: Array) -> Pencil:
+        """Return the linearization in time at x, at fixed parameters.
+
+        On curves the first free parameters are held; others, as multipliers or a speed, follow the states.
+        """
+        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s
+
+        n, points, rows = self._n, self.gauss_times.size, np.array(self.problem.rate_rows)
+        free = self._free[self.size - self.equations :]
+        field = self._field.jacobian(*self._inside(x), self.problem.batch("field").columns(free))[1]
+        ends = self._boundary.jacobian(*self._at_ends(x), self.problem.batch("boundary").columns(free))[1][0]
+        inside, last = np.arange(points * n).reshape(points, n, 1), np.arange(self.state_size, self.state_size + len(free))
+        at_ends = np.concatenate([np.arange(n), np.arange(self.state_size - n, self.state_size), last])
+        integrals = [self._to_nodes(self.gauss_weights[:, None] * field[:, q]) for q in range(n, field.shape[1])]
+        slopes = -self._h_points[:, :, None] * field[:, :n]
+        entries = [
+            self._by_nodes(slopes[:, :, :n], np.eye(n)), (slopes[:, :, n:], inside, last),
+            (ends, points * n + np.arange(len(ends))[:, None], at_ends),
+            *((row, np.array(points * n + len(ends) + q), np.arange(row.size)) for q, row in enumerate(integrals)),
+        ]  # fmt: skip
+        rates = self._rates(x)
+        taken = self._by_nodes(self._h_points[:, :, None] * rates)
+        places = inside[:, rows, 0].ravel()
+        into = csr_array((np.ones(places.size), (places, np.arange(places.size))), shape=(self.equations, places.size))
+        matrix = _gathered(entries, (self.equations, self.equations))
+        shift = _BEYOND * _bound(field[:, rows, :n], rates)
+        return Pencil(matrix, into, _gathered([taken], (places.size, self.equations)), shift)
+
+    def _by_nodes(self, values: Array, slopes: Array | None = None) -> Entries:
+        """Return the entries by the states at the nodes of rows (N d, r, n) by those at Gauss points, and by their slopes."""
+        places = np.tile(self.basis.value, (self.intervals, 1))
+        found = np.einsum("qm,qrb->qrmb", places, values)
+        if slopes is not None:
+            found += np.einsum("qm,rb->qrmb", np.tile(self.basis.slope, (self.intervals, 1)), slopes)
+        rows = np.arange(found.shape[0] * found.shape[1]).reshape(*found.shape[:2], 1, 1)
+        nodes = np.repeat(self._by_interval, self._d, axis=0)
+        return found, rows, nodes[:, None, :, None] * self._n + np.arange(self._n)
+
+    def _rates(self, x: Array) -> Array:
+        """Return the entries of M in the rows with rates at the Gauss points, (N d, R, n), in sizes of the states."""
+        n, batch, states = self._n, self.problem.batch("rates"), self.states_at_gauss_points(x)
+        at = self.gauss_times, np.hstack([states, np.zeros_like(states)]), np.empty((0, 2 * n)), self.all_parameters(x)
+        found = batch.jacobian(*at, batch.columns((), range(n, 2 * n)))[1]
+        sizes = self.scales.states
+        scaled: Array = found * sizes / sizes[self.problem.rate_rows][:, None]
+        return scaled
+
+    def check_solution(self, x: Array) -> None:
+        """Check that the rates are linear functions of those of the states, and that perturbations do not grow without bound.
+
+        Raises
+        ------
+        ProblemError
+        """
+        batch, states, sizes = self.problem.batch("rates"), self.states_at_gauss_points(x), self.scales.states
+        rates = np.random.default_rng(5).uniform(1, 2, states.shape)
+
+        def values(w: Array) -> Array:
+            at = self.gauss_times, np.hstack([states, w * sizes]), np.empty((0, 2 * self._n)), self.all_parameters(x)
+            found: Array = batch.values(*at) / sizes[self.problem.rate_rows]
+            return found
+
+        there, rest = values(rates), values(0 * rates)
+        size, linear = np.abs(there).max(initial=0.0), np.einsum("qrb,qb->qr", self._rates(x), rates)
+        if max(np.abs(rest).max(initial=0.0), np.abs(there - linear).max(initial=0.0)) > _LINEAR * size:
+            raise ProblemError("rates: each must be a linear function of the rates w, without a constant term")
+        if not size > 0:
+            raise ProblemError("rates: they do not depend on the rates w of any state at the solution")
+        found = self.eigenvalues(x)
+        if np.isnan(found).any():
+            raise ProblemError("rates: the equations and conditions do not determine how a perturbation moves in time")
+        if 2 * np.count_nonzero(found.real > 0) > self.gauss_times.size * len(self.problem.rate_rows):
+            raise ProblemError(
+                "rates: most perturbations grow, the shorter the faster, as if time ran backwards: a sign is wrong "
+                "(u_t = u_xx + f, with u' = v, has v' = -f + u_t)"
+            )
+
+
+def _gathered(entries: Sequence[Entries], shape: tuple[int, int]) -> Any:
+    """Return the sparse array of entries that are given with their rows and columns, which are broadcast."""
+    from scipy.sparse import csr_array
+
+    whole = [np.broadcast_arrays(*each) for each in entries]
+    values, rows, columns = (np.concatenate([each[k].ravel() for each in whole]) for k in range(3))
+    return csr_array((values, (rows, columns)), shape=shape)
+
+
+def _inverse(pencil: Pencil, kind: type) -> Function:
+    """Return the function of a shift s that returns T(s), as a function of vectors (m,) or of columns."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu  # type: ignore[import-untyped]
+
+    matrix, into, rates, _ = pencil
+
+    def inverse(shift: Any) -> Function:
+        factors = splu(csc_array(matrix - shift * (into @ rates), dtype=kind))
+        return lambda v: rates @ factors.solve(np.asarray(into @ v, dtype=kind))
+
+    return inverse
+
+
+def _bound(slopes: Array, rates: Array) -> float:
+    """Return the largest rate that the slopes (points, R, n) of the equations with rates allow; 1 where these are zero."""
+    sizes = np.abs(rates).max(axis=2)
+    quotients = np.abs(slopes).sum(axis=2)[sizes > 0] / sizes[sizes > 0]
+    return float(quotients.max(initial=0.0)) or 1.0
