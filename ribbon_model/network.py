@@ -674,10 +674,15 @@ class Network:
         return found
 
     def _at_end(self, point: Point, each: JointEnd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return force and moment on a member at an end, and the place of that end."""
+        """Return force and moment on a member at an end, and the place of that end.
+
+        The multiplier of the centreline is the force without p r x N / 2, as the area under a pressure p is that of a fan from
+        the origin; where a closed structure is joined, this part balances.
+        """
         row = self._state(point, each)
         sign = -1.0 if each.end == START else 1.0
-        return sign * row[11:14], sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
+        fan = point.parameters.get("pressure", 0.0) * np.cross(row[4:7], self.pressure_normal) / 2
+        return sign * (row[11:14] + fan), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
 
     def place(self, point: Point, joint: str) -> np.ndarray:
         """Return the place (3,) of a joint."""

@@ -1,0 +1,228 @@
+"""The states of all shipped networks of rods by shooting: Kirchhoff's equations with rotation matrices, and balances by hand.
+
+Nothing of contin is used: members are integrated with SciPy's DOP853, all ends meet by Newton's method with differences. The
+start is the state of the scene; where Newton's method ends, places, reactions and energy must be those of the scene.
+"""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.parse import load
+from ribbon_model.ends import CLAMPED, FREE, HINGED, prescribed
+from ribbon_model.network import BALL, FINISH, HINGE, START, Network
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SCENES = sorted(path.stem for path in CONFIGS.glob("network_*.yaml"))
+#: Those of many strips take ten seconds and more.
+LONG = ("network_arches", "network_bigon_ring", "network_hexagon", "network_hexagram")
+#: Steps of differences, and where Newton's method ends.
+_STEP, _ENOUGH = 1e-6, 1e-11
+
+
+def _frame(q) -> np.ndarray:
+    """Columns are directors; the quaternion has its scalar first."""
+    w, x, y, z = q
+    return Rotation.from_quat([x, y, z, w]).as_matrix()
+
+
+@dataclasses.dataclass
+class End:
+    """An end of a member: frame (columns are directors), place, force and moment of the rest of the network on it."""
+
+    frame: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+
+class Shooting:
+    """A network whose members are integrated from their beginnings: frame, place, force and moment there are unknown."""
+
+    def __init__(self, network: Network, numbers: dict[str, float]):
+        self.network, self.numbers, self.order = network, numbers, list(network.members)
+
+    def number(self, section: str, name: str) -> float:
+        full = name if len(self.network.sections) == 1 else f"{name}_{section}"
+        return self.numbers.get(full, self.network.sections[section].numbers.get(name, 0.0))
+
+    def integrated(self, name: str, start: End) -> tuple[End, float]:
+        """The far end of a member, and its energy."""
+        member, net = self.network.members[name], self.network
+        stiffness = [self.number(member.section, key) for key in ("B1", "B2", "C")]
+        natural = [self.number(member.section, key) for key in ("kappa_n", "kappa_2", "tau_n")]
+        pressure, weight, field = (self.numbers.get(key, 0.0) for key in ("pressure", "weight", "field"))
+        normal, down, along = (np.array(v) for v in (net.pressure_normal, net.weight_direction, net.field_direction))
+
+        def rates(s, y):
+            R, force, moment = y[:9].reshape(3, 3), y[12:15], y[15:18]
+            change = (R.T @ moment) / stiffness
+            u1, u2, u3 = change + natural
+            turning = np.array([[0, -u3, u2], [u3, 0, -u1], [-u2, u1, 0]])
+            d3, magnet = R[:, 2], R[:, net.magnetized]
+            load = weight * down - pressure * np.cross(d3, normal)
+            energy = (
+                change @ (stiffness * change) / 2
+                if math.isfinite(stiffness[1])
+                else (change[0] ** 2 * stiffness[0] + change[2] ** 2 * stiffness[2]) / 2
+            )
+            energy += pressure * normal @ np.cross(y[9:12], d3) / 2 - weight * down @ y[9:12] - field * magnet @ along
+            couple = -np.cross(d3, force) - field * np.cross(magnet, along)
+            return np.concatenate([(R @ turning).ravel(), d3, -load, couple, [energy]])
+
+        y = np.concatenate([start.frame.ravel(), start.place, -start.force, -start.moment, [0.0]])
+        y = solve_ivp(rates, (0, member.length), y, "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+        return End(y[:9].reshape(3, 3), y[9:12], y[12:15], y[15:18]), float(y[18])
+
+    def ends(self, name: str, unknowns: np.ndarray, base: np.ndarray) -> tuple[End, End, float]:
+        frame = base @ Rotation.from_rotvec(unknowns[:3]).as_matrix()
+        start = End(frame, unknowns[3:6], -unknowns[6:9], -unknowns[9:12])
+        finish, energy = self.integrated(name, start)
+        return start, finish, energy
+
+    # --- what vanishes ------------------------------------------------------------------------------------------------
+
+    def missed(self, both: list[tuple[End, End, float]]) -> np.ndarray:
+        """All conditions: joints, balances, supports, free ends, and a network that floats."""
+        net, found, joined = self.network, [], set()
+        for name, joint in net.joints.items():
+            ends, frames, places = [], [], []
+            for each in joint.members:
+                end = both[self.order.index(each.member)][0 if each.end == START else 1]
+                angle = self.numbers.get(each.angle, 0.0) if isinstance(each.angle, str) else each.angle
+                turned = Rotation.from_rotvec(-angle * np.array(each.axis)).as_matrix()
+                frames.append(end.frame @ _frame(net._drawn(each)[:4]).T @ turned)
+                places.append(end.place + end.frame @ each.arm)
+                ends.append(end)
+                joined.add((each.member, each.end))
+            origin = places[0]
+            force = sum(end.force for end in ends)
+            moment = sum(end.moment + np.cross(end.place - origin, end.force) for end in ends)
+            moments = [end.moment + np.cross(end.place - place, end.force) for end, place in zip(ends, places)]
+            for k in range(1, len(ends)):
+                found.append(places[k] - origin)
+                kind = joint.kind if not joint.members[k].goes_on else "rigid"
+                first = frames[0] if not joint.members[k].goes_on else frames[k - 1]
+                apart = Rotation.from_matrix(first.T @ frames[k]).as_rotvec()
+                if kind == HINGE:
+                    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+                    across = np.linalg.svd(axis[None])[2][1:]
+                    goes_on = k + 1 < len(ends) and joint.members[k + 1].goes_on
+                    own = moments[k] + moments[k + 1] if goes_on else moments[k]
+                    found += [across @ apart, [(frames[0] @ axis) @ own]]
+                elif kind == BALL:
+                    found.append(moments[k])
+                else:
+                    found.append(apart)
+            for number, given in net.loads.items():
+                for where, direction, arm in given.forces:
+                    if where == name:
+                        force = force - self.numbers[number] * np.array(direction)
+                        moment = moment - np.cross(frames[0] @ arm, self.numbers[number] * np.array(direction))
+            found += self._supported(name, frames[0], origin, force, moment)
+        for number, name in enumerate(self.order):
+            for end, which in ((START, 0), (FINISH, 1)):
+                if (name, end) not in joined:
+                    found += [both[number][which].force, both[number][which].moment]
+        return np.concatenate([np.ravel(part) for part in found])
+
+    def _supported(self, name: str, frame, place, force, moment) -> list:
+        """The balance of a joint, as far as nothing holds it; what holds it; a network that floats is held as it is."""
+        net = self.network
+        if name not in net.held:
+            floats = net.floats and name == next(iter(net.joints))
+            return (
+                [place - self.held[0], Rotation.from_matrix(self.held[1].T @ frame).as_rotvec()] if floats else [force, moment]
+            )
+        end, drawn = net.held[name], net._drawn(net.joints[name].members[0])
+        moves = np.array([self.numbers.get(f"{name}_{x}", 0.0) for x in ("dx", "dy", "dz")])
+        turns = prescribed(*(self.numbers.get(f"{name}_{x}", 0.0) for x in ("turn", "bend", "swing")))
+        along = np.array(end.held).reshape(-1, 3)
+        free = np.linalg.svd(along)[2][len(along) :] if len(along) else np.eye(3)
+        found = [along @ (place - drawn[4:] - moves), free @ force]
+        turned = Rotation.from_matrix(_frame(turns).T @ frame).as_rotvec()
+        if end.rotation == CLAMPED:
+            return [*found, turned]
+        if end.rotation == FREE:
+            return [*found, moment]
+        assert end.rotation == HINGED
+        axis = np.array(end.axis)
+        for number, given in net.loads.items():
+            moment = moment - sum(factor * self.numbers[number] for where, factor in given.moments if where == name) * axis
+        return [*found, np.linalg.svd(axis[None])[2][1:] @ turned, [axis @ moment]]
+
+    # --- Newton's method ----------------------------------------------------------------------------------------------
+
+    def solved(self, states: list[np.ndarray]) -> tuple[list[tuple[End, End, float]], float]:
+        """The ends of all members next to states (14,) of their beginnings, and how far these have moved."""
+        bases = [_frame(state[:4]) for state in states]
+        fan = self.numbers.get("pressure", 0.0) * np.array(self.network.pressure_normal) / 2
+        forces = [state[11:14] + np.cross(state[4:7], fan) for state in states]  # n of the multiplier of the centreline
+        starts = [[0, 0, 0, *state[4:7], *n, *self._moment(state)] for state, n in zip(states, forces)]
+        x = np.array(starts, dtype=float)
+        first, count = x.copy(), len(states)
+        both = [self.ends(*given) for given in zip(self.order, x, bases)]
+        if self.network.floats:
+            each = next(iter(self.network.joints.values())).members[0]
+            end = both[self.order.index(each.member)][0 if each.end == START else 1]
+            self.held = end.place + end.frame @ each.arm, end.frame @ _frame(self.network._drawn(each)[:4]).T
+        for _ in range(12):
+            missed = self.missed(both)
+            if np.abs(missed).max() < _ENOUGH:
+                break
+            slopes = np.empty((missed.size, 12 * count))
+            for member in range(count):
+                for i in range(12):
+                    moved = x[member].copy()
+                    moved[i] += _STEP
+                    other = [*both]
+                    other[member] = self.ends(self.order[member], moved, bases[member])
+                    slopes[:, 12 * member + i] = (self.missed(other) - missed) / _STEP
+            x -= np.linalg.lstsq(slopes, missed)[0].reshape(count, 12)
+            both = [self.ends(*given) for given in zip(self.order, x, bases)]
+        assert np.abs(self.missed(both)).max() < 1e-9
+        return both, float(np.abs(x - first).max())
+
+    @staticmethod
+    def _moment(state: np.ndarray) -> np.ndarray:
+        """The moment on the lab axes from the multipliers of a quaternion: 2 M_i = lambda . (q e_i)."""
+        w, x, y, z = state[:4]
+        rows = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]) / 2
+        return _frame(state[:4]) @ (rows @ state[7:11])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("networks")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name in LONG else name for name in SCENES])
+def test_shooting_finds_the_same_states(name, folder):
+    scene, path = load(CONFIGS / f"{name}.yaml"), folder / f"{name}.h5"
+    run_scene(scene, path, Display(silent=True))
+    branch = read_branch(path)
+    for stage in np.unique(branch.stage_of):
+        row = int([point for point in branch.kept() if branch.stage_of[point] == stage][-1])
+        network, (_, states) = scene.strip(int(stage)), branch.states_at(row)
+        numbers = branch._numbers(row)
+        shooting = Shooting(network, numbers)
+        both, moved = shooting.solved([states[0, list(piece.at)] for piece in network.problem.pieces])
+        size = 1 + max(np.abs(states[:, list(piece.at[11:14])]).max() for piece in network.problem.pieces)
+        assert moved < 1e-8 * size, f"{name}, stage {stage}"
+        assert sum(energy for *_, energy in both) == pytest.approx(float(branch.points["energy"][row]), abs=1e-9 * size)
+        for joint_name, joint in network.joints.items():
+            each = joint.members[0]
+            end = both[shooting.order.index(each.member)][0 if each.end == START else 1]
+            if len(joint.members) == 1 and joint_name in network.held and not network.loads:
+                pulls = [float(branch.points[f"F_{joint_name}_{x}"][row]) for x in "xyz"]
+                assert end.force == pytest.approx(pulls, abs=1e-8 * size)
+            place = end.place + end.frame @ each.arm
+            assert place == pytest.approx([float(branch.points[f"{joint_name}_{x}"][row]) for x in "xyz"], abs=1e-9 * size)
