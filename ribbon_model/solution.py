@@ -117,10 +117,6 @@ class Solution:
         x = quadrature_centreline(self.t, self.states, self.degree, self.parameters["length"])
         return interpolated(self.t, np.hstack([self.states, x]), self.degree, t)
 
-    def on_nodes(self, t: np.ndarray) -> np.ndarray:
-        """Return the states at places t (K,) of the unit interval, shape (K, n)."""
-        return self.states if np.array_equal(t, self.t) else interpolated(self.t, self.states, self.degree, t)
-
     def equilibrium(self) -> Equilibrium:
         """Return the equilibrium along the whole loop, for its second variation; raises as `from_solution`."""
         return from_solution(self.law, self.domain, self.t, self.states, self.degree, self.parameters)

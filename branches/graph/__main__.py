@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from branches.graph import closed as diagram
-from branches.graph.stored import OPEN_FORMAT, read_any
+from branches.graph.stored import CLOSED_FORMAT, OPEN_FORMAT, read_any
 from branches.scene.closed import and_nu
 from branches.store.command import Parser, complain, write_output
 from branches.store.files import StoreError
@@ -69,9 +69,12 @@ def main(argv=None) -> int:
 
 
 def _answers(graph, options) -> Iterable[str]:
-    if graph.graph["format"] == OPEN_FORMAT:
-        yield from _of_open_strips(graph, options)
-        return
+    answers = {CLOSED_FORMAT: _of_closed_strips, OPEN_FORMAT: _of_open_strips}
+    return answers[graph.graph["format"]](graph, options)
+
+
+def _of_closed_strips(graph, options) -> Iterable[str]:
+    """Yield what is asked of a diagram of closed strips."""
     if "source" in graph.graph:
         yield graph.graph["source"]
     if options.where:

@@ -19,7 +19,6 @@ from branches.store.read import read_branch
 from contin import ContinError, ConvergenceError, Settings
 from contin.lowlevel import Collocation, Continuation, correct, point_of
 from ribbon_model import exact
-from ribbon_model.shape import interpolated
 
 #: Columns of a state.
 _COLUMNS = ("kappa_star", "energy")
@@ -178,13 +177,12 @@ def _guess(branch: StoredBranch, arclength: float, kappa_n: float) -> tuple[Coll
     kept = kept[np.argsort(abs(s - arclength), kind="stable")[:_AROUND]]
     s = branch.points["arclength"][kept]
     weights = [np.prod([(arclength - b) / (a - b) for b in s if b != a]) for a in s]
-    solutions = [branch.solution(int(point)) for point in kept]
-    first = solutions[0]
-    states = sum(w * interpolated(one.t, one.states, one.degree, first.t) for w, one in zip(weights, solutions))
-    numbers = {name: sum(w * one.parameters[name] for w, one in zip(weights, solutions)) for name in first.parameters}
-    numbers |= {"kappa_n": kappa_n}
-    mesh = np.append(first.t[: -1 : first.degree], 1.0)
-    system = Collocation(first.domain.problem(first.law), mesh, first.degree, first.domain.free[1:], numbers)
+    found = [branch.discretized(int(point)) for point in kept]
+    first = found[0][0]
+    states = sum(w * one.evaluate(x, first.nodes) for w, (one, x) in zip(weights, found))
+    values = sum(w * one.all_parameters(x) for w, (one, x) in zip(weights, found))
+    numbers = {**dict(zip(first.problem.parameters, map(float, values))), "kappa_n": kappa_n}
+    system = Collocation(first.problem, first.mesh, first.degree, first.free[1:], numbers)
     return system, system.pack(states, numbers)
 
 
@@ -195,11 +193,11 @@ def _followed(branch: StoredBranch, arclength: float, kappa_n: float) -> Iterato
     for row, ahead in ((kept[s[kept] <= arclength][-1:], 1), (kept[s[kept] > arclength][:1], -1)):
         if not row.size or not 0 <= row[0] + ahead < len(s) or branch.points["label"][row[0]] == b"LP":
             continue
-        solution, direction = branch.solution(int(row[0])), np.sign(kappas[row[0] + ahead] - kappas[row[0]])
-        system, x = solution.discretized()
+        direction = np.sign(kappas[row[0] + ahead] - kappas[row[0]])
+        system, x = branch.discretized(int(row[0]))
         settings = Settings(direction=int(direction or 1), zeros={"kappa_n": [kappa_n]}, max_points=_STEPS, errors=False)
         with contextlib.suppress(ContinError):
             for point in Continuation(system, x, settings):
                 if point.label == "UZ":
-                    yield point.system.with_free(solution.domain.free[1:], point.x)
+                    yield point.system.with_free(system.free[1:], point.x)
                     break

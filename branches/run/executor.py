@@ -1,4 +1,8 @@
-"""Run independent jobs in processes of this machine or on a Dask cluster; the callers do not know which."""
+"""Run independent jobs in processes of this machine or on a Dask cluster; the callers do not know which.
+
+The processes are our own: `concurrent.futures.ProcessPoolExecutor` fails all jobs where one process dies, and cannot end a job
+that takes too long.
+"""
 
 from __future__ import annotations
 
