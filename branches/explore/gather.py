@@ -10,6 +10,7 @@ from branches.explore import open_strips, profiles, strips
 from branches.graph.stored import DIAGRAM, read_any
 from branches.run.executor import executor, run_jobs
 from branches.run.progress import Progress
+from branches.store.command import typed
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED, OPEN
 from branches.store.read import read_branch
@@ -66,7 +67,10 @@ def left_out(data: dict) -> list[dict]:
 def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
     """Return the data of a page of strips, of the kind of the first one."""
     pages = {CLOSED: _of_closed_strips, OPEN: _of_open_strips}
-    return pages[read_branch(files[0]).scene.KIND](files, titles, progress)
+    kind = read_branch(files[0]).scene.KIND
+    if kind not in pages:
+        raise StoreError(f"{str(files[0])!r} is of a {kind}, which pages do not show; {typed('plot')} {files[0]} draws it")
+    return pages[kind](files, titles, progress)
 
 
 def _of_open_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:

@@ -282,10 +282,6 @@ class StagedScene(Scene):
 
     title_or_name = heading
 
-    def value(self, name: str, number: float) -> str:
-        """Return a number with its unit, as text."""
-        return f"{exact_text(number)} {self.unit(name)}".strip()
-
 
 class OpenScene(StagedScene):
     """An open strip (or a closed, twisted one), and the stages in which its numbers are followed."""

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from branches.explore.gather import gather
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.runner import run_scene
@@ -201,3 +202,9 @@ def test_a_mistake_is_one_sentence(change):
         parse(text, "scene.yaml")
     assert MISTAKES[change] in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_pages_do_not_show_networks(run, tmp_path):
+    run(CANTILEVER)
+    with pytest.raises(StoreError, match=r"is of a network, which pages do not show; .* draws it"):
+        gather([str(tmp_path / "result.h5")])
