@@ -84,7 +84,7 @@ def scale_bar(axes, branch, reach: float) -> None:
     size = max(step * decade for step in (1, 2, 5) if step * decade <= longest)
     x, y = -0.97 * reach, -0.9 * reach
     axes.plot([x, x + size / unit], [y, y], color=OTHER, lw=2, solid_capstyle="butt")
-    words = f"{size:g} {'L' if branch.length == 1.0 else 'm'}"
+    words = f"{size:g} {branch.length_unit}".rstrip()
     axes.annotate(words, (x, y), (0, 3), textcoords="offset points", fontsize=9, color=OTHER)
 
 

@@ -71,9 +71,12 @@ def steady(strips: dict) -> dict:
 
 
 def places(strip) -> np.ndarray:
-    """Points of the centreline at equal distances, shape (_STATIONS, 3)."""
-    stations = np.linspace(0, strip.arclength[-1], _STATIONS)
-    return np.column_stack([np.interp(stations, strip.arclength, x) for x in strip.centreline.T])
+    """Points of the centreline at equal distances, _STATIONS of each strip, shape (K, 3)."""
+    found = []
+    for part in parts_of(strip):
+        stations = np.linspace(0, part.arclength[-1], _STATIONS)
+        found.append(np.column_stack([np.interp(stations, part.arclength, x) for x in part.centreline.T]))
+    return np.concatenate(found)
 
 
 def reach_of(shapes, width: float, view: View = OBLIQUE) -> float:

@@ -261,6 +261,11 @@ class StoredBranch(ABC):
     def length(self) -> float:
         """The length of the scene's strip; 1 without dimensions."""
 
+    @property
+    def length_unit(self) -> str:
+        """What lengths of pictures are given in: m where the scene has dimensions, otherwise the length of the strip."""
+        return "L" if self.length == 1.0 else "m"
+
     @abstractmethod
     def width_at(self, length: float, thickness: float | None) -> float | None:
         """Return the width of the scene's strip at a length, or that from a thickness and the law's Gamma, or None."""

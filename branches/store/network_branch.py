@@ -36,10 +36,12 @@ class NetworkBranch(OpenBranch):
 
     def placed(self, point: int, length: float, cells: int = 0):
         """Networks are not scaled to a length; raise StoreError."""
-        raise StoreError("meshes and tables of states are of one strip, and this result is of a network; --film shows it")
+        raise StoreError("meshes and tables of states are of one strip, and this result is of a network; --movie shows it")
 
     def width_at(self, length: float, thickness: float | None) -> float | None:
         return None
+
+    length_unit = ""
 
     def drawn_width(self, strips: list, asked: float | None) -> float:
         longest = max(part.arclength[-1] for strip in strips for part in strip.parts)

@@ -398,6 +398,6 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
             break
     found: list[Array] = []
     for end in ends[errors < 1e-9]:
-        if all(np.linalg.norm(end - other) > _SAME for other in found):
+        if not found or np.linalg.norm(np.array(found) - end, axis=1).min() > _SAME:
             found.append(end)
     return found

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from branches.read import read_branch
@@ -159,34 +160,47 @@ class Shooting:
             moment = moment - sum(factor * self.numbers[number] for where, factor in given.moments if where == name) * axis
         return [*found, np.linalg.svd(axis[None])[2][1:] @ turned, [axis @ moment]]
 
-    # --- Newton's method ----------------------------------------------------------------------------------------------
-
-    def solved(self, states: list[np.ndarray]) -> tuple[list[tuple[End, End, float]], float]:
-        """The ends of all members next to states (14,) of their beginnings, and how far these have moved."""
+    def begun(self, states: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray, list[tuple[End, End, float]]]:
+        """Frames, unknowns (members, 12) and ends for states (14,) of the beginnings; a network that floats is held so."""
         bases = [_frame(state[:4]) for state in states]
         fan = self.numbers.get("pressure", 0.0) * np.array(self.network.pressure_normal) / 2
         forces = [state[11:14] + np.cross(state[4:7], fan) for state in states]  # n of the multiplier of the centreline
         starts = [[0, 0, 0, *state[4:7], *n, *self._moment(state)] for state, n in zip(states, forces)]
         x = np.array(starts, dtype=float)
-        first, count = x.copy(), len(states)
         both = [self.ends(*given) for given in zip(self.order, x, bases)]
         if self.network.floats:
             each = next(iter(self.network.joints.values())).members[0]
             end = both[self.order.index(each.member)][0 if each.end == START else 1]
             self.held = end.place + end.frame @ each.arm, end.frame @ _frame(self.network._drawn(each)[:4]).T
+        return bases, x, both
+
+    def slopes(self, bases: list[np.ndarray], x: np.ndarray, step: float, missed: np.ndarray | None = None) -> np.ndarray:
+        """Derivatives of what vanishes: differences to what is ``missed`` at x, or central ones without that."""
+        both, columns = [self.ends(*given) for given in zip(self.order, x, bases)], []
+        for member, name in enumerate(self.order):
+            for i in range(12):
+                moved = np.repeat(x[member][None], 2, axis=0)
+                moved[:, i] += (step, -step)
+                found = []
+                for unknowns in moved[: 1 if missed is not None else 2]:
+                    other = [*both]
+                    other[member] = self.ends(name, unknowns, bases[member])
+                    found.append(self.missed(other))
+                columns.append((found[0] - missed) / step if missed is not None else (found[0] - found[1]) / (2 * step))
+        return np.array(columns).T
+
+    # --- Newton's method ----------------------------------------------------------------------------------------------
+
+    def solved(self, states: list[np.ndarray]) -> tuple[list[tuple[End, End, float]], float]:
+        """The ends of all members next to states (14,) of their beginnings, and how far these have moved."""
+        bases, x, both = self.begun(states)
+        first = x.copy()
         for _ in range(12):
             missed = self.missed(both)
             if np.abs(missed).max() < _ENOUGH:
                 break
-            slopes = np.empty((missed.size, 12 * count))
-            for member in range(count):
-                for i in range(12):
-                    moved = x[member].copy()
-                    moved[i] += _STEP
-                    other = [*both]
-                    other[member] = self.ends(self.order[member], moved, bases[member])
-                    slopes[:, 12 * member + i] = (self.missed(other) - missed) / _STEP
-            x -= np.linalg.lstsq(slopes, missed)[0].reshape(count, 12)
+            slopes = self.slopes(bases, x, _STEP, missed)
+            x -= np.linalg.lstsq(slopes, missed)[0].reshape(x.shape)
             both = [self.ends(*given) for given in zip(self.order, x, bases)]
         assert np.abs(self.missed(both)).max() < 1e-9
         return both, float(np.abs(x - first).max())
@@ -226,3 +240,24 @@ def test_shooting_finds_the_same_states(name, folder):
                 assert end.force == pytest.approx(pulls, abs=1e-8 * size)
             place = end.place + end.frame @ each.arm
             assert place == pytest.approx([float(branch.points[f"{joint_name}_{x}"][row]) for x in "xyz"], abs=1e-9 * size)
+
+
+def test_the_determinant_vanishes_where_a_bigon_buckles(folder):
+    """3.682897251: of the flat bigon of 60 degrees, C = .75; central differences leave 1e-8."""
+    scene, path = load(CONFIGS / "network_bigon.yaml"), folder / "flat.h5"
+    run_scene(scene.up_to(1), path, Display(silent=True))
+    branch = read_branch(path)
+    network, (_, states) = scene.strip(), branch.states_at(0)
+    buckling = float(branch.events["kappa_n"][branch.events["label"] == b"BP"][0])
+
+    def determinant(kappa_n):
+        shooting, starts = Shooting(network, {**branch._numbers(0), "kappa_n": kappa_n}), []
+        for piece in network.problem.pieces:
+            state = states[0, list(piece.at)].copy()
+            state[7:11] *= 1 - kappa_n / (math.pi / 3)  # M = B1 (2 alpha - kappa_n)
+            starts.append(state)
+        bases, x, both = shooting.begun(starts)
+        assert np.abs(shooting.missed(both)).max() < 1e-10
+        return np.linalg.det(shooting.slopes(bases, x, 1e-5))
+
+    assert brentq(determinant, buckling - 0.05, buckling + 0.05) == pytest.approx(buckling, abs=3e-8)
