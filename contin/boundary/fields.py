@@ -20,17 +20,24 @@ by a diagonal Pade approximant, which has the modulus 1 on the imaginary axis on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Function
+from contin.boundary.field_form import FieldForm
 from contin.boundary.system import Collocation
+from contin.core.labels import Label
 from contin.core.spectral import Spectral
 from contin.core.trial import Event
+from contin.defining.hopf_curve import HopfCurve
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
+from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
+from contin.events.labelled import frequency_of
+from contin.events.normal_forms import at_special_point
 from contin.linalg.rightmost import nearest_of, rightmost_of
 
 #: Most rates at Gauss points for which T is formed: its eigenvalues take 0.15 s then.
@@ -73,6 +80,32 @@ class Fields(Spectral, Collocation):
     def is_sparse(self) -> bool:
         """Not all eigenvalues are computed: the mesh is long."""
         return self.gauss_times.size * len(self.problem.rate_rows) > _DENSE
+
+    @property
+    def finds_nearest(self) -> bool:
+        """A single eigenvalue is found in less time than all that are wanted: asked for by the search for Hopf points."""
+        return self.is_sparse
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """That of Hopf points."""
+        return {HopfCurve.kind: HopfCurve}
+
+    def defining(self, point: Any, x: Array) -> tuple[HopfCurve, Array] | None:
+        """Return that of Hopf points."""
+        frequency = frequency_of(point)
+        if point.label != Label.HOPF or frequency is None:
+            return None
+        return HopfCurve(self, size=frequency**2), np.append(x, 1.0)
+
+    def form(self, x: Array) -> FieldForm:
+        """Return that of a steady state."""
+        return FieldForm(self, x)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return the first Lyapunov coefficient at a Hopf point, unless coefficients of rates depend on the states."""
+        at_hopf = point.label == Label.HOPF and not self.problem.batch("rates").depends[:, : self._n].any()
+        return at_special_point(self, point) if at_hopf else None
 
     def unstable(self, x: Array) -> int:
         """Return the number of unstable eigenvalues."""
@@ -156,6 +189,21 @@ class Fields(Spectral, Collocation):
         sizes = self.scales.states
         scaled: Array = found * sizes / sizes[self.problem.rate_rows][:, None]
         return scaled
+
+    @property
+    def moving_states(self) -> Array:
+        """1 for the states whose rates occur, else 0, shape (n,)."""
+        found: Array = self.problem.batch("rates").depends[:, self._n : 2 * self._n].any(axis=0).astype(float)
+        return found
+
+    def rates_gradient(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the derivatives of w.B v by x, shape (size,), for w (equations,) and v (size,)."""
+        n, batch, rows, sizes = self._n, self.problem.batch("rates"), self.problem.rate_rows, self.scales.states
+        both = np.hstack([self.states_at_gauss_points(x), self.states_at_gauss_points(v)])
+        at = self.gauss_times, both, np.empty((0, 2 * n)), self.all_parameters(x)
+        slopes = batch.jacobian(*at, batch.columns(self._free, range(n)))[1] / sizes[rows][:, None]
+        weights = self._h_points * w[: self._inner].reshape(-1, n)[:, rows]
+        return self._to_nodes(np.einsum("qr,qrb->qb", weights, slopes) * np.append(sizes, self.free_scales))
 
     def check_solution(self, x: Array) -> None:
         """Check that the rates are linear functions of those of the states, and that perturbations do not grow without bound.

@@ -134,7 +134,9 @@ class CriticalCurve(Defining):
                 w[: form.equations] = copies[copy]
                 result[i, : base.size] -= base.bent(self.inside(x), w, wide)
         if self.own_unknowns:
-            changed = self.coupling_slope(self.kappa(x)) @ right
+            changed, coupled = self.coupling_slope(self.kappa(x)) @ right, self.coupling(self.kappa(x)) @ right
+            for row, copies in zip(result, left):
+                row[: base.size] += form.coupled_gradient(copies, coupled)
             result[:, -1] = [form.coupled(copies, changed).sum() * self.kappa_size for copies in left]
         return result
 

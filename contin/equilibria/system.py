@@ -10,10 +10,10 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.trial import Event
+from contin.defining.hopf_curve import HopfCurve
 from contin.equilibria.dependence import dependence
 from contin.equilibria.equations import AlgebraicEquations
 from contin.equilibria.folds import HOMOCLINIC, events_on_folds
-from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import critical_pair, form_of
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient

@@ -68,6 +68,9 @@ def _nearest(value: complex) -> Event:
     """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
 
     def function(trial: Trial) -> float:
+        system: Any = trial.system  # one with eigenvalues
+        if getattr(system, "finds_nearest", False):
+            return float(system.eigenvalue_near(trial.x, value).real)
         values = _upper(trial)
         return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 

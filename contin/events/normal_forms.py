@@ -83,6 +83,10 @@ class Form(ABC):
         one, other = self.coupled_parts(left, right)
         return (one * other).sum(axis=-1)
 
+    def coupled_gradient(self, left: Array, right: Array) -> Array | float:
+        """Return the derivatives of the sum of w.E v over the copies by x, shape (size,); 0 where E is constant."""
+        return 0.0
+
     @abstractmethod
     def coupling(self, rate: complex) -> Any:
         """Return the number P of perturbations with this rate."""

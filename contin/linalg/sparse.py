@@ -16,7 +16,7 @@ _BORDER = 2.0**-30
 
 
 class SparseFactors:
-    """LU of a sparse matrix: `Factors` of large systems without a mesh.
+    """LU of a sparse matrix, real or complex: `Factors` of large systems without a mesh.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class SparseFactors:
 
     @functools.cached_property
     def sign(self) -> float:
-        """Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite, or the solver does not say it.
+        """Sign of the determinant: 0 if the matrix is singular, NaN if it is complex or not finite, or the solver does not say.
 
         It takes a copy of SuperLU's factors, so it is computed when it is first asked for.
         """
@@ -70,7 +70,7 @@ class SparseFactors:
             return 0.0 if self._is_finite else np.nan
         if hasattr(lu, "sign"):
             return float(lu.sign)
-        if not (hasattr(lu, "perm_r") and hasattr(lu, "perm_c") and hasattr(lu, "U")):
+        if np.iscomplexobj(self._matrix) or not (hasattr(lu, "perm_r") and hasattr(lu, "perm_c") and hasattr(lu, "U")):
             return np.nan
         negative = np.count_nonzero(lu.U.diagonal() < 0) + _odd(lu.perm_r) + _odd(lu.perm_c)
         return -1.0 if negative % 2 else 1.0
@@ -84,7 +84,7 @@ class SparseFactors:
         return self._solved(c, "T")
 
     def _solved(self, b: Array, kind: str) -> Array:
-        b = np.asarray(b, dtype=float)
+        b = np.asarray(b, dtype=self._matrix.dtype)
         if self._lu is None:
             return np.full(b.shape, np.nan)
         transposed = kind == "T"

@@ -24,9 +24,9 @@ from contin.core.protocol import Discretization
 from contin.core.trial import linearization
 from contin.cycles.curves import TorusCurve
 from contin.defining.fold_curve import FoldCurve
+from contin.defining.hopf_curve import HopfCurve
 from contin.defining.system import Defining
 from contin.equilibria.folds import HOMOCLINIC
-from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import critical_pair
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError

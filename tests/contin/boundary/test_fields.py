@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+import scipy.linalg
 from scipy.special import ellipj, ellipk
 
 import contin
@@ -164,6 +165,59 @@ def test_hopf_points_of_the_brusselator_are_in_order_and_where_the_closed_form_h
     assert counts[0] == 0 and counts[-1] == 8 and counts == sorted(counts)
 
 
+def lines(n):
+    """The same with differences at n nodes: equilibria of 2 n ordinary differential equations."""
+    h = 1 / (n - 1)
+
+    def field(u, p, out):
+        for i in range(n):
+            x, y = u[i], u[n + i]
+            left, right = (i - 1 if i else 1), (i + 1 if i < n - 1 else n - 2)
+            grown = x**2 * y
+            out[i] = DX / h**2 * (u[left] - 2 * x + u[right]) + p[0] - (p[1] + 1) * x + grown
+            out[n + i] = DY / h**2 * (u[n + left] - 2 * y + u[n + right]) + p[1] * x - grown
+
+    names = [*(f"x{i}" for i in range(n)), *(f"y{i}" for i in range(n))]
+    return contin.AlgebraicProblem(field, names, {"a": A, "b": 5.05}, count=2 * n)
+
+
+def test_lyapunov_coefficients_are_those_of_the_reaction_and_of_the_method_of_lines():
+    """The uniform mode is that of the reaction. cos(pi s) has the mean square 1/2; its squares at n nodes add to (n + 1)/2."""
+    uniform_mode, first = contin.trace(uniform(4.9), free=["b"], limits={"b": (4.9, 5.2)}).labelled("HB")
+    reaction = contin.AlgebraicProblem(
+        lambda u, p: (p.a - (p.b + 1) * u.x + u.x**2 * u.y, p.b * u.x - u.x**2 * u.y), ["x", "y"], {"a": A, "b": 4.9}
+    )
+    (alone,) = trace(reaction, [A, 2.45], "b", (4.9, 5.2)).labelled("HB")
+    assert uniform_mode.normal_form == pytest.approx(alone.normal_form, rel=1e-10)
+    found = []
+    for n in (9, 17):
+        (point,) = trace(lines(n), [A] * n + [2.525] * n, "b", (5.05, 5.2)).labelled("HB")
+        found.append((n + 1) * point.normal_form)
+    assert first.normal_form == pytest.approx((4 * found[1] - found[0]) / 3, rel=1e-4)
+    assert first.name == "Hopf, supercritical"
+
+
+def test_a_curve_of_hopf_points_in_two_parameters_of_which_one_is_a_diffusivity():
+    def field(t, u, p):
+        grown = u.x**2 * u.y
+        return u.dx, -(p.a - (p.b + 1) * u.x + grown) / p.d, u.dy, -2 * (p.b * u.x - grown) / p.d
+
+    problem = contin.BoundaryValueProblem(
+        field, lambda a, b, p: (a.dx, b.dx, a.dy, b.dy), ["x", "dx", "y", "dy"], {"a": A, "b": 5.05, "d": 0.008},
+        rates={"dx": lambda t, u, w, p: w.x / p.d, "dy": lambda t, u, w, p: 2 * w.y / p.d},
+    )  # fmt: skip
+    (point,) = trace(problem, [A, 0, 2.525, 0], "b", (5.05, 5.2)).labelled("HB")
+    for second, limits in (("d", (0.002, 0.012)), ("a", (1.5, 2.5))):
+        hopf = contin.curve(point, second, limits={second: limits})
+        for each in hopf:
+            known = 1 + each["a"] ** 2 + 1.5 * each["d"] * math.pi**2
+            assert each["b"] == pytest.approx(known, abs=1e-8) and each["lyapunov"] < 0
+    system, x = hopf[0].system, hopf[0].x + 1e-3 * np.random.default_rng(3).standard_normal(hopf[0].x.size)
+    along = np.random.default_rng(4).standard_normal(x.size)
+    steps = [system.own_values(x + s * along) for s in (1e-6, -1e-6)]
+    assert np.allclose(system.own_gradients(x) @ along, (steps[0] - steps[1]) / 2e-6, rtol=1e-5)
+
+
 def test_a_long_mesh_gives_the_eigenvalues_that_a_short_one_does():
     short, long = (BRUSSELATOR.discretized([], {"b": 5.5}, None, np.linspace(0, 1, n + 1), 4) for n in (20, 90))
     assert not short.is_sparse and long.is_sparse
@@ -306,3 +360,96 @@ def test_what_does_not_move_has_no_spectrum_and_cycles_of_fields_are_refused():
     point = contin.trace(uniform(4.9), free=["b"], limits={"b": (4.9, 5.05)}).labelled("HB")[0]
     with pytest.raises(ProblemError, match="time-periodic states of a field"):
         contin.trace(point, branch=1)
+
+
+# --- independent computations --------------------------------------------------------------------------------------------
+
+
+def test_stability_of_the_bimodal_state_of_kuramoto_and_sivashinsky():
+    """u_t = -4 u_xxxx - alpha (u_xx + u u_x), odd. Branch point and eigenvalues are compared with 24 sine modes."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.b, u.c, u.d, -p.alpha / 4 * (u.c + u.a * u.b)), lambda a, b, p: (a.a, a.c, b.a, b.c),
+        ["a", "b", "c", "d"], {"alpha": 15.0}, domain=(0.0, math.pi), rates={"d": lambda t, u, w, p: -w.a / 4},
+    )  # fmt: skip
+    (start,) = trace(problem, [0] * 4, "alpha", (15.0, 17.0)).labelled("BP")
+    branch = contin.trace(start, branch=1, limits={"alpha": (10, 25)})
+    (crossed,) = [point for point in branch.labelled("BP") if abs(point["alpha"] - 16) > 1e-6]
+    assert abs(crossed["alpha"] - 16.1399) < 5e-5  # Kevrekidis, Nicolaenko & Scovel 1990
+    counts = [(unstable(point), point["alpha"] > crossed["alpha"]) for point in branch if point.label != "BP"]
+    assert {count for count, beyond in counts if beyond} == {0} and {count for count, beyond in counts if not beyond} == {1}
+
+    modes = np.arange(1, 25)
+    last = branch[-1]
+
+    def linear(amplitudes):
+        """The matrix of v -> -4 v_xxxx - alpha (v_xx + (u v)_x) in sines, u in them given."""
+        i, j = modes[:, None], modes
+        u = np.concatenate([[0], amplitudes, np.zeros(3 * len(modes))])
+        product = (np.where(j <= i, u[np.abs(i - j)], 0) - np.where(j > i, u[np.abs(i - j)], 0) - u[i + j]) / 2
+        return np.diag(-4.0 * modes**4 + last["alpha"] * modes**2) - last["alpha"] * modes[:, None] * product
+
+    t = np.linspace(0, math.pi, 401)
+    u = last.system.evaluate(last.x, t)[:, 0]
+    amplitudes = np.array([2 / math.pi * np.trapezoid(u * np.sin(k * t), t) for k in modes])
+    known = np.sort(np.linalg.eigvals(linear(amplitudes)).real)[::-1]
+    assert np.allclose(np.sort(last.system.eigenvalues(last.x)[:4].real)[::-1], known[:4], rtol=1e-5)
+
+
+def chebyshev(count):
+    """Return nodes between 0 and 1 and the matrix of the derivative there (Trefethen, Spectral Methods in MATLAB)."""
+    x = np.cos(np.pi * np.arange(count + 1) / count)
+    c = np.r_[2, np.ones(count - 1), 2] * (-1.0) ** np.arange(count + 1)
+    matrix = np.outer(c, 1 / c) / (x[:, None] - x + np.eye(count + 1))
+    return (x + 1) / 2, 2 * (matrix - np.diag(matrix.sum(axis=1)))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_linear_fields_against_a_spectral_method(seed):
+    """w_t = D w'' + B w' + C(s) w with conditions on w, or on w' and w, at both ends: counts, and eigenvalues within errors."""
+    random = np.random.default_rng(seed)
+    d, b = (10 ** random.uniform(-2, 0.5, 2)).tolist(), (random.normal(size=(2, 2)) * random.uniform(0, 2)).tolist()
+    c = (random.normal(size=(3, 2, 2)) * 10 ** random.uniform(0, 1)).tolist()
+    robin, kind = random.uniform(0, 2, (2, 2)).tolist(), random.integers(0, 2, (2, 2)).tolist()
+
+    def entry(i, j, t):
+        return c[0][i][j] + c[1][i][j] * math.cos(3 * t) + c[2][i][j] * math.sin(2 * t)
+
+    def rhs(t, u, p):
+        w, slope = (u.x, u.y), (u.dx, u.dy)
+        f = [sum(entry(i, j, t) * w[j] + b[i][j] * slope[j] for j in range(2)) for i in range(2)]
+        return u.dx, -f[0] / d[0], u.dy, -f[1] / d[1]
+
+    def boundary(first, last, p):
+        found = []
+        for end, u in enumerate((first, last)):
+            for i, (w, slope) in enumerate(((u.x, u.dx), (u.y, u.dy))):
+                found.append(slope - (1 - 2 * end) * robin[end][i] * w if kind[end][i] else w)
+        return found
+
+    problem = contin.BoundaryValueProblem(
+        rhs, boundary, ["x", "dx", "y", "dy"], {},
+        rates={"dx": lambda t, u, w, p: w.x / d[0], "dy": lambda t, u, w, p: w.y / d[1]},
+    )  # fmt: skip
+    spectrum = contin.solve(problem, [0] * 4).spectrum()
+
+    def by_chebyshev(count):
+        t, slope = chebyshev(count)
+        n, weights = count + 1, np.eye(2 * count + 2)
+        matrix = np.block([[
+            np.diag([entry(i, j, s) for s in t]) + b[i][j] * slope + (d[i] * slope @ slope if i == j else 0) for j in range(2)
+        ] for i in range(2)])  # fmt: skip
+        for end, at in ((0, count), (1, 0)):
+            for i in range(2):
+                row = np.zeros(2 * n)
+                row[i * n : (i + 1) * n] = slope[at] * kind[end][i]
+                row[i * n + at] += 1 - kind[end][i] - kind[end][i] * (1 - 2 * end) * robin[end][i]
+                matrix[i * n + at], weights[i * n + at] = row, 0
+        values = scipy.linalg.eigvals(matrix, weights)
+        return values[np.isfinite(values)]
+
+    coarse, fine = by_chebyshev(48), by_chebyshev(60)
+    assert spectrum.unstable == np.count_nonzero(fine.real > 0)
+    off, own = (np.abs(values[:, None] - spectrum.values[:8]) for values in (fine, coarse))
+    best = np.minimum(off.min(axis=0), own.min(axis=0))
+    assert np.all(best <= spectrum.errors[:8] + 1e-8)  # what round-off leaves of the spectral method
+    assert np.all(spectrum.errors[:8] < 1e-4)

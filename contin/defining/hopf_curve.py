@@ -1,4 +1,4 @@
-"""The defining system of a curve of Hopf points of equilibria in two parameters.
+"""The defining system of a curve of Hopf points, of equilibria and of fields, in two parameters.
 
 With A the Jacobian and v = v_1 + i omega v_2, the equations A v = i omega v are A v_1 = -kappa v_2 and A v_2 = v_1: kappa is
 omega^2, and
@@ -21,12 +21,11 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
+from contin.core.spectral import Spectral
 from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve, degenerate, other_pairs, signed_smallest
-from contin.equilibria.equations import AlgebraicEquations
 from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.normal_forms import coefficient, pair
-from contin.linalg.dense import eigenvalues
 
 #: A kappa below this part of its first value is zero: Bogdanov-Takens points are located more exactly than that.
 _NO_FREQUENCY = 1e-10
@@ -35,7 +34,10 @@ T = TypeVar("T")
 
 
 class HopfCurve(CriticalCurve):
-    """Hopf points of an `Algebraic` system made by `as_field`; columns ``frequency`` and ``lyapunov`` (l1)."""
+    """Hopf points of a `Fields` system, or of an `Algebraic` one made by `as_field`.
+
+    Columns ``frequency`` and ``lyapunov`` (l1).
+    """
 
     kind = Label.HOPF
     own_equations, own_unknowns = 2, 1
@@ -69,10 +71,9 @@ class HopfCurve(CriticalCurve):
         return np.array([*known, self.imaginary_part(x), lyapunov])
 
     def others(self, x: Array) -> ComplexArray:
-        """Return the eigenvalues but the two that are critical."""
-        base = cast(AlgebraicEquations, self.base)
-        values = eigenvalues(base.field_jacobian(self.inside(x)))
-        return values[np.argsort(np.abs(values**2 + self.kappa(x)))[2:]]
+        """Return the eigenvalues but the two that are critical, times -1: not all stable ones of a field are known."""
+        values = cast(Spectral, self.base).computed_eigenvalues(self.inside(x))
+        return -values[np.argsort(np.abs(values**2 + self.kappa(x)))[2:]]
 
     def events(self) -> list[Event]:
         """Return those of Bogdanov-Takens, generalized Hopf (Bautin), zero-Hopf (fold-Hopf) and double Hopf points."""
