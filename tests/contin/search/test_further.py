@@ -129,6 +129,21 @@ def test_a_disconnected_branch_of_a_boundary_value_problem():
         assert slopes == pytest.approx(shot(lam, 0.3)[0], abs=1e-6)
 
 
+def test_the_upper_solution_that_the_limits_part_from_the_lower_one():
+    """Bratu's problem on two segments; u is 2 log cosh(theta / 4) in the middle, with theta = sqrt(2 lam) cosh(theta / 4)."""
+    walls = [contin.Segment(lambda s, u, p: (u.v, -p.lam * math.exp(u.u) / 4), ["u", "v"])] * 2
+    problem = contin.SegmentedProblem(
+        walls, lambda a, b, p: (a[0].u, b[0].u - a[1].u, b[0].v - a[1].v, b[1].u), {"lam": 1.0}
+    )  # fmt: skip
+    for seed in (0, 1):
+        search = Search([1.0], seed=seed)
+        found = diagram(solve(problem, [0, 0, 0, 0]), free=["lam"], limits={"lam": (0.5, 2)}, search=search)
+        points = [point for branch in found.branches for point in branch if abs(point["lam"] - 1) < 1e-9]
+        middles = sorted({round(float(point.segment(0)(1.0)[0, 0]), 7) for point in points})
+        thetas = [brentq(lambda x: x - math.sqrt(2) * math.cosh(x / 4), *ends) for ends in ((0, 4), (4, 20))]
+        assert middles == pytest.approx([2 * math.log(math.cosh(theta / 4)) for theta in thetas], abs=1e-6)
+
+
 def carrier():
     """Carrier's equation: eight solutions at eps = 1/5 (3000 shots: tests/test_gallery.py counts as many)."""
     return BoundaryValueProblem(
