@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -213,8 +214,19 @@ class BoundaryValueProblem(Restated):
         left = [*(f"{name}'" for name in u), *["0 = integral of"] * self.integral_size]
         shared, values = inside[: len(inside) - len(left)], inside[len(inside) - len(left) :]
         lines = [*shared, *(f"{name} {value}" if name[0] == "0" else f"{name} = {value}" for name, value in zip(left, values))]
+        shared, rates = self._rates_in_words()
+        lines = [*shared, *(line + rates.get(line.partition("'")[0], "") for line in lines)]
         count = len(ends) - self.boundary_size
         return "\n".join([*lines, *ends[:count], *(f"0 = {value}" for value in ends[count:])])
+
+    def _rates_in_words(self) -> tuple[list[str], dict[str, str]]:
+        """Return what the rates in time use several times, as lines, and what they add to the equations of states by name."""
+        if not self.rates:
+            return [], {}
+        u, count = self.state_names, len(self.rates)
+        text = self.batch("rates").text([*u, *(f"{name}_t" for name in u), *self.parameters])
+        lines = [re.sub(r"\bz(\d+)\b", r"r\1", line) for line in text]  # z1, z2, ... are those of the right-hand side
+        return lines[:-count], {name: f" + {rate}" for name, rate in zip(self.rates, lines[-count:])}
 
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""

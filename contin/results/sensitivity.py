@@ -52,7 +52,7 @@ def _fixed(point: Record, held: str | Callable[[Trial], float] | None) -> str | 
         return held
     system = system_of(point, "point")
     columns = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
-    if held is None and point.label == Label.HOPF and frequency_of(point) is not None and not system.intervals:
+    if held is None and point.label == Label.HOPF and frequency_of(point) is not None and not system.is_cycle:
         return critical_real_part(point.details["frequency"])
     if held is None:
         held = point.column or (system.free[0] if point.label in (Label.REGULAR, Label.END) else None)

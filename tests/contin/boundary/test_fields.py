@@ -280,6 +280,17 @@ def test_folds_of_the_snake_change_the_stability_as_the_index_of_its_energy_does
     )
 
 
+def test_what_is_known_at_a_hopf_point_and_of_the_equations():
+    hopf = contin.trace(uniform(4.9), free=["b"], limits={"b": (4.9, 5.2)}).labelled("HB")
+    assert [point.sensitivities()["a"]["b"] for point in hopf] == pytest.approx([2 * A, 2 * A], rel=1e-6)
+    text = BRUSSELATOR.equations()
+    assert f"dx' = -(z1 + a - x * (b + 1)) / {DX} + x_t / {DX}" in text and "\nx' = dx\n" in text
+    still = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -u.u), dirichlet, ["u", "v"], {}, rates={
+        "v": lambda t, u, w, p: (1 + u.u) * w.u + (1 + u.u) ** 2 * w.u
+    })  # fmt: skip
+    assert "r1 = " in still.equations() and "v' = -u + " in still.equations()
+
+
 # --- integral conditions, multipliers, and what is refused ---------------------------------------------------------------
 
 
