@@ -40,8 +40,9 @@ from contin.events.labelled import frequency_of
 from contin.events.normal_forms import at_special_point
 from contin.linalg.rightmost import nearest_of, rightmost_of
 
-#: Most rates at Gauss points for which T is formed: its eigenvalues take 0.15 s then.
-_DENSE = 300
+#: Most rates at Gauss points for which T is formed: its eigenvalues take half a second then. Arnoldi's method takes 0.15 s of
+#: the Brusselator there, but ten seconds of the equation of Swift and Hohenberg.
+_DENSE = 1000
 #: Eigenvalues that are kept, those furthest to the right, besides all that are unstable. Fewer than ten would leave out
 #: pairs that move to the axis over one step.
 _KEPT = 24
@@ -71,6 +72,8 @@ class Fields(Spectral, Collocation):
     """A `BoundaryValueProblem` with ``rates`` on a mesh."""
 
     plain = False
+    #: A single eigenvalue is found in less time than all that are wanted: asked for by the search for Hopf points.
+    finds_nearest = True
 
     def events(self) -> list[Event]:
         """Return also that of Hopf points."""
@@ -80,11 +83,6 @@ class Fields(Spectral, Collocation):
     def is_sparse(self) -> bool:
         """Not all eigenvalues are computed: the mesh is long."""
         return self.gauss_times.size * len(self.problem.rate_rows) > _DENSE
-
-    @property
-    def finds_nearest(self) -> bool:
-        """A single eigenvalue is found in less time than all that are wanted: asked for by the search for Hopf points."""
-        return self.is_sparse
 
     @property
     def curves(self) -> Mapping[str, type]:

@@ -218,7 +218,8 @@ def test_a_curve_of_hopf_points_in_two_parameters_of_which_one_is_a_diffusivity(
     assert np.allclose(system.own_gradients(x) @ along, (steps[0] - steps[1]) / 2e-6, rtol=1e-5)
 
 
-def test_a_long_mesh_gives_the_eigenvalues_that_a_short_one_does():
+def test_a_long_mesh_gives_the_eigenvalues_that_a_short_one_does(monkeypatch):
+    monkeypatch.setattr(fields, "_DENSE", 300)
     short, long = (BRUSSELATOR.discretized([], {"b": 5.5}, None, np.linspace(0, 1, n + 1), 4) for n in (20, 90))
     assert not short.is_sparse and long.is_sparse
     few, many = (system.eigenvalues(system.pack([[A, 0, 2.75, 0]] * len(system.nodes), {})) for system in (short, long))
@@ -404,6 +405,31 @@ def test_stability_of_the_bimodal_state_of_kuramoto_and_sivashinsky():
     amplitudes = np.array([2 / math.pi * np.trapezoid(u * np.sin(k * t), t) for k in modes])
     known = np.sort(np.linalg.eigvals(linear(amplitudes)).real)[::-1]
     assert np.allclose(np.sort(last.system.eigenvalues(last.x)[:4].real)[::-1], known[:4], rtol=1e-5)
+
+
+def test_counts_change_at_labelled_points_only():
+    """In the diagram of Kuramoto and Sivashinsky up to 40: by one at folds, by two at Hopf points, by one or none at BP."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.b, u.c, u.d, -p.alpha / 4 * (u.c + u.a * u.b)), lambda a, b, p: (a.a, a.c, b.a, b.c),
+        ["a", "b", "c", "d"], {"alpha": 1.0}, domain=(0.0, math.pi), rates={"d": lambda t, u, w, p: -w.a / 4},
+        functionals={"energy": lambda t, u, p: u.a**2},
+    )  # fmt: skip
+    diagram = contin.diagram(contin.solve(problem, [0] * 4), free=["alpha"], limits={"alpha": (1, 40)})
+    allowed = {(): {0}, ("LP",): {1}, ("HB",): {2}, ("BP",): {0, 1}}
+    steps, hopf = 0, []
+    for branch in diagram.branches:
+        hopf += [point["alpha"] for point in branch.labelled("HB")]
+        before, passed = None, ()
+        for point in branch:
+            if point.label in ("LP", "BP", "HB"):
+                passed += (point.label,)
+            elif not (point.label == "EP" and point["energy"] < 1e-12):  # branches close, or end, at branch points
+                count = unstable(point)
+                if before is not None and passed in allowed:
+                    assert abs(count - before) in allowed[passed]
+                    steps += 1
+                before, passed = count, ()
+    assert steps > 150 and any(abs(value - 30.3452) < 5e-5 for value in hopf)  # the bimodal state oscillates from there on
 
 
 def chebyshev(count):
