@@ -44,7 +44,7 @@ def test_a_script_finds_its_number(name, tmp_path, monkeypatch):
 def test_every_script_is_in_the_navigation_of_the_site():
     groups = gallery.fields(yaml.safe_load((PROJECT / "mkdocs.yml").read_text())["nav"])
     assert sorted(name for group in groups.values() for name in group) == NAMES
-    assert len(NAMES) == 16 and len(groups) == 5
+    assert len(NAMES) == 17 and len(groups) == 5
 
 
 @pytest.mark.parametrize("name", NAMES)
