@@ -138,9 +138,8 @@ def legendre() -> Event:
     def margin(trial: Trial) -> float:
         system: Any = trial.system
         if system.problem.legendre is None:
-            n, jacobian = system.problem.dimension, _jacobian(system, trial.x)
-            parts = (states[states < n] for states in system.separate_states)
-            value = min(_convexity(jacobian[:, own[:, None], n + own]) for own in parts)
+            parts = _jacobians(system, trial.x)
+            value = min(_convexity(jacobian[:, : len(own), len(own) :]) for own, jacobian in parts)
         else:
             points = system.states_at_gauss_points(trial.x)
             value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
@@ -280,12 +279,9 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
     ProblemError
         End conditions that repeat or contradict each other there.
     """
-    n, parts = system.problem.dimension, []
-    jacobian = _jacobian(system, x)
-    for states in system.separate_states:
-        own, rest = states[states < n], np.arange(2 * n, jacobian.shape[1])
-        both = np.concatenate([own, n + own])
-        local = _intervals(system, jacobian[:, np.append(both, rest)][:, :, both])
+    parts = []
+    for own, jacobian in _jacobians(system, x):
+        local = _intervals(system, jacobian)
         if local is None:
             return None
         parts.append(_part(system, own, *local))
@@ -352,11 +348,23 @@ def _products(weights: Array, a: Array, b: Array) -> Array:
     return result
 
 
-def _jacobian(system: Collocation, x: Array) -> Array:
-    """Return the derivatives of rhs and integrands by (x, lambda) at the Gauss points, in the user's units."""
-    batch = system.problem.batch("field")
-    points = system.states_at_gauss_points(x)
-    found: Array = batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.columns([]))[1]
+def _jacobians(system: Collocation, x: Array) -> list[tuple[Indices, Array]]:
+    """Return the states x of each part of the problem, n of them, and derivatives at the Gauss points, in the user's units.
+
+    They are those of the rates of these x and lambda and of the integrands, by x and lambda: shape (N d, 2 n + n_int, 2 n).
+    """
+    batch, count = system.problem.batch("field"), system.problem.dimension
+    points, columns, found = system.states_at_gauss_points(x), batch.columns([]), []
+    entries = batch.entries(system.gauss_times, points, points[:0], system.all_parameters(x), columns)[1]
+    for states in system.separate_states:
+        own = states[states < count]
+        both, place = np.concatenate([own, count + own]), np.full(batch.count, -1)
+        place[both] = np.arange(len(both))
+        place[2 * count :] = len(both) + np.arange(batch.count - 2 * count)
+        kept = (place[columns.rows] >= 0) & (place[columns.places] >= 0)
+        jacobian = np.zeros((len(points), len(both) + batch.count - 2 * count, len(both)))
+        jacobian[:, place[columns.rows[kept]], place[columns.places[kept]]] = entries[:, kept]
+        found.append((own, jacobian))
     return found
 
 
