@@ -27,19 +27,30 @@ from typing import Any
 
 import numpy as np
 
-from contin import ContinError, Event, Point, ProblemError, SegmentedVariationalProblem, VariationalSegment, solve, trace
-from contin.lowlevel import Collocation, Continuation
+from contin import (
+    ContinError,
+    Event,
+    MeshControl,
+    Point,
+    ProblemError,
+    SegmentedVariationalProblem,
+    VariationalSegment,
+    solve,
+    trace,
+)
+from contin.lowlevel import Collocation, Continuation, Undetermined
 from ribbon_model import ends, law_end, natural_state
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
-from ribbon_model.section import Section
+from ribbon_model.section import NATURAL, Section
 from ribbon_model.shape import Shape, quaternions, shape_of
 
 #: Kinds of joints.
 RIGID, HINGE, BALL = "rigid", "hinge", "ball"
 #: Ends of a member.
 START, FINISH = "start", "finish"
-#: The number that closes the gaps and turns of the joints, from 0 (as drawn) to 1.
+#: The number that leads from the drawing, which is free of stress at 0, to the network at 1: natural strains, loads, and gaps
+#: and turns of joints are this part of theirs.
 ASSEMBLY = "assembly"
 #: Displacements of a joint along the axes of the drawing, behind its name.
 MOVES = ("dx", "dy", "dz")
@@ -47,6 +58,24 @@ MOVES = ("dx", "dy", "dz")
 _POTENTIALS = ("weight", "pressure", "field")
 #: A quaternion, scalar first.
 Quaternion = tuple[float, float, float, float]
+
+
+#: Why a state is not determined.
+MECHANISM = (
+    "joints: the network can move, or a strip can turn about itself, without a change of energy, so nothing determines its "
+    "state; hold more, or join rigidly"
+)
+#: Why forces are not determined.
+UNDETERMINED = (
+    "joints: what is joined and held repeats itself in this state, so the forces are not determined (straight strips between "
+    "places that are held cannot lengthen); draw a strip with a bend, or hold less"
+)
+#: The mesh of first states: a coarse one has solutions that are none.
+_MESH = MeshControl(1e-9, max_intervals=200)
+#: A state that Newton's method finds is that of the drawing if it is nearer than this; others may be anywhere.
+_NEAR = 0.3
+#: An eigenvalue of the second variation below this part of the largest is zero; see `ribbon_model.open_strip`.
+_ZERO = 1e-10
 
 
 @dataclass(frozen=True)
@@ -326,7 +355,7 @@ class Network:
             self._full(name, number): value
             for name, section in self.sections.items() for number, value in section.parameters.items()
         }  # fmt: skip
-        return values | own | ({ASSEMBLY: 1.0} if self._is_open else {})
+        return values | own | {ASSEMBLY: 1.0}
 
     def _full(self, section: str, number: str) -> str:
         """Return the name of a number of a section among all."""
@@ -350,11 +379,6 @@ class Network:
                     found[name, number] = tuple(map(float, place - places[0]))
         return found
 
-    @property
-    def _is_open(self) -> bool:
-        """Whether the drawing has gaps or turns that are to be closed."""
-        return bool(self._gaps) or any(each.angle != 0 for joint in self.joints.values() for each in joint.members)
-
     # --- the problem --------------------------------------------------------------------------------------------------
 
     @functools.cached_property
@@ -366,10 +390,11 @@ class Network:
         ProblemError
             Conditions that repeat or contradict each other.
         """
-        densities: dict[str, Callable] = {}
+        densities: dict[tuple, Callable] = {}
         segments = []
         for member in self.members.values():
-            key = member.section if self.sections[member.section].homogeneous else f"{member.section} {member.length}"
+            homogeneous = self.sections[member.section].homogeneous
+            key = member.section, member.strains, None if homogeneous else member.length
             if key not in densities:
                 densities[key] = self._hamiltonian(member)
             segments.append(VariationalSegment(None, (*FRAME, *CENTRELINE), member.length, hamiltonian=densities[key]))
@@ -379,15 +404,20 @@ class Network:
         section, length, name = self.sections[member.section], member.length, member.section
         complementary, own = section.hamiltonian(), tuple(section.parameters)
         numbers, full = namedtuple("Numbers", own), [self._full(name, number) for number in own]
+        drawn = dict(zip(NATURAL, member.strains))
         homogeneous, potential = section.homogeneous, self._distributed()
+        drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
 
         def hamiltonian(s, x, lam, p):
             q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
             rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
             M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
             d = directors(*q)
-            value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*(getattr(p, each) for each in full)))
-            return value + n1 * d[6] + n2 * d[7] + n3 * d[8] - potential(x, d, p)
+            values = [getattr(p, each) for each in full]
+            for number, strain in drawn.items():
+                values[number] = p.assembly * values[number] + (1 - p.assembly) * strain
+            value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*values))
+            return value + n1 * d[6] + n2 * d[7] + n3 * d[8] - p.assembly * potential(x, d, p)
 
         return hamiltonian
 
@@ -526,9 +556,9 @@ class Network:
             value = 0.0
             for number, read, direction in forces:
                 place = read(a, b, p)[0][1]
-                value = value - getattr(p, number) * sum(u * x for u, x in zip(direction, place) if u != 0)
+                value = value - p.assembly * getattr(p, number) * sum(u * x for u, x in zip(direction, place) if u != 0)
             for number, factor, read, angle, frame_of in turns:
-                value = value - getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
+                value = value - p.assembly * getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
             return value
 
         return potential
@@ -544,28 +574,62 @@ class Network:
     ) -> tuple[Point, str]:
         """Return a first state, and how it was found, in words.
 
-        Newton's method begins with the drawing, or with a guess. Where that fails, and the drawing has gaps or turns, these are
-        closed step by step.
+        Newton's method begins with the drawing, or with a guess. Where that fails, it begins with the drawing as a natural
+        state without loads; then natural strains, loads, gaps and turns follow step by step.
 
         Raises
         ------
         ProblemError
             No state was found, or nothing determines it.
         """
-        options = {"intervals": intervals, "degree": degree, **options}
-        guess = self.guess() if guess is None else guess
+        options = {"intervals": intervals, "degree": degree, "mesh": _MESH, **options}
+        is_drawn = guess is None
+        guess = self.guess() if is_drawn else guess
+        first: ContinError | None = None
         try:
-            return solve(self.problem, guess, values, **options), "from the drawing"
+            point = self._determined(solve(self.problem, guess, values, **options))
+            if self._moved_by(point, guess) < _NEAR:
+                return point, "from the drawing"
         except ContinError as error:
-            if not self._is_open:
-                raise ProblemError(str(error)) from error
-        drawn = solve(self.problem, guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
-        closing = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False)
-        if abs(closing[-1][ASSEMBLY] - 1) > LOOSE:
+            first = error
+        try:
+            drawn = self._determined(solve(self.problem, guess, {**(values or {}), ASSEMBLY: 0.0}, **options))
+        except ContinError as error:
+            singular = is_drawn and isinstance(error, ConvergenceError)  # the drawing is a solution: what fails is the matrix
+            raise ProblemError(MECHANISM if singular else self._reason(error)) from first
+        way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False)
+        if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
+            told = f": {self._reason(first)}" if first else ""
             raise ProblemError(
-                f"joints: the gaps and turns could not be closed; at {closing[-1][ASSEMBLY]:.3g} of the way: {closing.stop}"
+                f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
+                f"{way[-1][ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
             )
-        return solve(self.problem, closing[-1]), "by closing the gaps and turns of the joints step by step"
+        return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
+
+    def _moved_by(self, point: Point, guess: Any) -> float:
+        """Return by how much a state is away from a guess: quaternions, and places over the longest length."""
+        if not isinstance(guess, list):
+            return 0.0
+        states, t, away = point.system.states(point.x), point.system.nodes, 0.0
+        length = max(member.length for member in self.members.values())
+        for member, piece, begun in zip(self.members.values(), self.problem.pieces, guess):
+            drawn = np.array([np.asarray(begun(member.length * s) if callable(begun) else begun)[:7] for s in t])
+            change = np.abs(states[:, list(piece.at[:7])] - drawn) / np.repeat([1.0, length], [4, 3])
+            away = max(away, float(change.max()))
+        return away
+
+    def _determined(self, point: Point) -> Point:
+        """Return a state; raise ProblemError where something can move without a change of energy."""
+        sizes = np.abs(point.second_variation().eigenvalues)
+        if sizes.size and not sizes.min() > _ZERO * sizes.max():
+            raise ProblemError(MECHANISM)
+        return point
+
+    @staticmethod
+    def _reason(error: ContinError) -> str:
+        """Return why no state was found, in the words of networks."""
+        text = str(error)
+        return MECHANISM if Undetermined.MODE in text else UNDETERMINED if Undetermined.CONDITIONS in text else text
 
     def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
         """Return the sizes of states and numbers for `contin.Settings.scales`, at a state; see `OpenStrip.sizes`.
@@ -652,13 +716,13 @@ class Network:
             for number, load in self.loads.items():
                 for where, direction, arm in load.forces:
                     if where == name:
-                        force -= point[number] * np.array(direction)
-                        moment -= np.cross(self._arm(point, joint.members[0], arm), point[number] * np.array(direction))
+                        pull = point[ASSEMBLY] * point[number] * np.array(direction)
+                        force, moment = force - pull, moment - np.cross(self._arm(point, joint.members[0], arm), pull)
                 for where, factor in load.moments:
                     if where == name:
                         frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
                         axes = np.array(directors(*frame)).reshape(3, 3)
-                        moment -= point[number] * factor * (np.array(self.held[name].axis) @ axes)
+                        moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ axes)
             found[name] = force, moment
         if self.floats:
             ((name, _), *_) = self.members.items()
@@ -681,7 +745,7 @@ class Network:
         """
         row = self._state(point, each)
         sign = -1.0 if each.end == START else 1.0
-        fan = point.parameters.get("pressure", 0.0) * np.cross(row[4:7], self.pressure_normal) / 2
+        fan = point[ASSEMBLY] * point.parameters.get("pressure", 0.0) * np.cross(row[4:7], self.pressure_normal) / 2
         return sign * (row[11:14] + fan), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
 
     def place(self, point: Point, joint: str) -> np.ndarray:

@@ -106,7 +106,7 @@ class NetworkStage(OpenStage):
         if name in network.loads:
             return f"number of the load {name}", name
         if name == ASSEMBLY:
-            return "part of the gaps and turns of joints that is closed", "assembly"
+            return "part of natural strains, loads, gaps and turns of joints that acts", "assembly"
         if name == "floating":
             return "largest reaction to what holds the network that floats: an error", "reaction of what floats"
         if name == "potential":

@@ -247,7 +247,7 @@ def test_joints_turned_and_with_gaps_are_closed_step_by_step():
     joint = Joint([JointEnd("a", START), JointEnd("a", FINISH, angle=angle, axis=AXIS)])
     loop = Network({"strip": _rod(1.0, 3.0, 2.0)}, {"a": strip}, {"J": joint})
     point, how = loop.first_point()
-    assert how == "by closing the gaps and turns of the joints step by step"
+    assert how == "from the drawing without stress, step by step"
     shape = loop.shapes(point)["a"]
     assert np.abs(shape.centreline[-1] - shape.centreline[0]).max() < 1e-10
     turned = math.acos(np.clip(shape.directors[0, 2] @ shape.directors[-1, 2], -1, 1))
