@@ -29,6 +29,7 @@ import numpy as np
 
 from contin import (
     ContinError,
+    ConvergenceError,
     Event,
     MeshControl,
     Point,
