@@ -605,7 +605,10 @@ class Network:
                 f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
                 f"{way[-1][ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
             )
-        return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
+        try:
+            return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
+        except ContinError as error:  # the way has come there: what fails is the matrix
+            raise ProblemError(MECHANISM) from error
 
     def _moved_by(self, point: Point, guess: Any) -> float:
         """Return by how much a state is away from a guess: quaternions, and places over the longest length."""
