@@ -72,7 +72,6 @@ class Fields(Spectral, Collocation):
     """A `BoundaryValueProblem` with ``rates`` on a mesh."""
 
     plain = False
-    #: A single eigenvalue is found in less time than all that are wanted: asked for by the search for Hopf points.
     finds_nearest = True
 
     def events(self) -> list[Event]:
@@ -219,7 +218,10 @@ class Fields(Spectral, Collocation):
             return found
 
         there, rest = values(rates), values(0 * rates)
-        size, linear = np.abs(there).max(initial=0.0), np.einsum("qrb,qb->qr", self._rates(x), rates)
+        linear = np.einsum("qrb,qb->qr", self._rates(x), rates)
+        if not (np.isfinite(there).all() and np.isfinite(linear).all()):
+            raise ProblemError("rates: they are not finite at the solution")
+        size = np.abs(there).max(initial=0.0)
         if max(np.abs(rest).max(initial=0.0), np.abs(there - linear).max(initial=0.0)) > _LINEAR * size:
             raise ProblemError("rates: each must be a linear function of the rates w, without a constant term")
         if not size > 0:

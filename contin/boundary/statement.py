@@ -109,6 +109,8 @@ class BoundaryValueProblem(Restated):
             checks.chosen("rates", [name], self.state_names)
             if argument_count(checks.function(f"rates: {name}", function)) != 4:
                 raise ProblemError(f"rates: {name} must be a function of 4 arguments, (t, u, w, p)")
+            if result_count(function, self._signatures()["rates"], f"rates: {name}"):
+                raise ProblemError(f"rates: {name} must return one number")
 
     def discretized(
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
@@ -306,6 +308,7 @@ def _of_both(function: Function, names: Sequence[str]) -> Function:
         values = list(both)
         return function(t, states(*values[: len(names)]), states(*values[len(names) :]), p)
 
+    of_both.__name__ = function.__name__
     return of_both
 
 

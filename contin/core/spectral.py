@@ -18,6 +18,9 @@ class Spectral:
     This is what `contin.events.hopf` asks for; kinds say in `spectra` what the eigenvalues are.
     """
 
+    #: `eigenvalue_near` takes less time than all eigenvalues that are wanted: a search then follows one by it.
+    finds_nearest = False
+
     @abstractmethod
     def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
         """Return the eigenvalues at places: those of pairs on the axis up to round-off with the real part 0, and as computed.

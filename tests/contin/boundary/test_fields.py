@@ -292,6 +292,32 @@ def test_what_is_known_at_a_hopf_point_and_of_the_equations():
     assert "r1 = " in still.equations() and "v' = -u + " in still.equations()
 
 
+def test_a_pulse_of_gray_and_scott_where_half_of_the_spectrum_is_known():
+    """u_t = u'' - u v^2 + (1 - u) / g and g v_t = g v'' - v + u v^2: u + g v moves by itself, with z = -1 / g - (n pi / L)^2.
+
+    The pulse is that of Hale, Peletier & Troy (1999); it is a saddle, as small pulses are.
+    """
+    g, length = 0.15, 8.0
+    wide = math.sqrt(1 - 4.5 * g)
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.p, u.u * u.v**2 - (1 - u.u) / g, u.q, (u.v - u.u * u.v**2) / g),
+        lambda a, b, p: (a.p, b.p, a.q, b.q), ["u", "p", "v", "q"], {}, domain=(0.0, length),
+        rates={"p": lambda t, u, w, p: w.u, "q": lambda t, u, w, p: w.v},
+    )  # fmt: skip
+
+    def pulse(t):
+        low = 1 + wide * math.cosh(t / math.sqrt(g))
+        slope = -3 * wide * math.sinh(t / math.sqrt(g)) / math.sqrt(g) / low**2
+        return 1 - 3 * g / low, -g * slope, 3 / low, slope
+
+    point = contin.solve(problem, pulse)
+    assert np.allclose(point.system.evaluate(point.x, np.array([1.0]))[0], pulse(1.0), atol=1e-7)  # the line is cut off
+    spectrum = point.spectrum()
+    known = -1 / g - (np.arange(6) * math.pi / length) ** 2
+    nearest = np.abs(spectrum.values[:, None] - known).argmin(axis=0)
+    assert np.all(np.abs(spectrum.values[nearest] - known) <= spectrum.errors[nearest] + 1e-9) and spectrum.unstable == 1
+
+
 # --- integral conditions, multipliers, and what is refused ---------------------------------------------------------------
 
 
@@ -334,6 +360,8 @@ def stated(**options):
         ({"v": lambda t, u, p: u.u}, "rates: v must be a function of 4 arguments"),
         ({"v": "u"}, "rates: v"),
         ("u", "rates: 'u'"),
+        ({"v": lambda t, u, w, p: (w.u,)}, "rates: v must return one number"),
+        ({"v": lambda t, u, w, p: w.z}, "z"),
     ],
 )
 def test_rates_that_cannot_be_used(rates, message):
@@ -347,6 +375,7 @@ def test_rates_that_cannot_be_used(rates, message):
         (lambda t, u, w, p: w.u**2, "linear"),
         (lambda t, u, w, p: w.u + 1.0, "linear"),
         (lambda t, u, w, p: u.u, "do not depend"),
+        (lambda t, u, w, p: w.u / (t - t), "not finite"),
         (lambda t, u, w, p: -w.u, "a sign is wrong"),
     ],
 )
