@@ -103,7 +103,8 @@ def of_contin():
         contin.MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0}), run, run.state,
         lowlevel.Trial.without_tangent(fold.system, fold.x), contin.Event("UZ", "x", lambda trial: trial["a"]),
         contin.Settings(),
-        contin.Search([1.0]), lowlevel.further([branch[0]], "a"), orbit.phase_response(), lowlevel.Undetermined.MODE,
+        contin.Search([1.0]), lowlevel.further([branch[0]], "a"), orbit.phase_response(),
+        branch[0].spectrum(), lowlevel.Undetermined.MODE,
         lowlevel.basis(4), contin.ProblemError("a sentence"), contin.ConvergenceError("a sentence"),
         lowlevel.correct(lowlevel.Algebraic(cusp, []), [1.0]), contin.Reason.LIMIT, lowlevel.Colour.BLUE,
     ]  # fmt: skip
