@@ -405,7 +405,6 @@ class Network:
         section, length, name = self.sections[member.section], member.length, member.section
         complementary, own = section.hamiltonian(), tuple(section.parameters)
         numbers, full = namedtuple("Numbers", own), [self._full(name, number) for number in own]
-        drawn = dict(zip(NATURAL, member.strains))
         homogeneous, potential = section.homogeneous, self._distributed()
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
 
