@@ -323,7 +323,7 @@ def test_a_parameter_may_be_named_like_a_function_beside_it():
     """The function above is not called: ``p.load`` is an attribute."""
     batch = Batch([lambda u, p: (p.load * u.x,)], [1], ["x"], ["load"], times=False)
     assert batch.interpreted is None
-    assert batch.values(np.zeros(1), np.array([[2.0]]), np.empty((0, 1)), np.array([3.0]))[0, 0] == 6
+    assert batch.values(np.zeros(1), np.array([[2.0]]), np.empty((0, 1)), np.array([3.0]))[0, 0] == pytest.approx(6)
 
 
 def test_differences_beside_a_narrow_feature():
