@@ -164,15 +164,15 @@ def rotation_conditions(end: End) -> Callable[..., tuple]:
         return lambda q, q1: relative(q, q1)[1:]
     if end.rotation == HINGED:
         pair = perpendicular(end.axis)
-        return lambda q, q1: tuple(_along(vector, relative(q, q1)[1:]) for vector in pair)
+        return lambda q, q1: tuple(along(vector, relative(q, q1)[1:]) for vector in pair)
     axis, first = end.axis, 3 * end.director
-    return lambda q, q1: (_along(axis, directors(*relative(q, q1))[first : first + 3]),)
+    return lambda q, q1: (along(axis, directors(*relative(q, q1))[first : first + 3]),)
 
 
 def place_conditions(end: End) -> Callable[..., tuple]:
     """Return ``conditions(r, r1)``, what vanishes for the place r of an end whose prescribed place is r1."""
     held = end.held
-    return lambda r, r1: tuple(_along(vector, [a - b for a, b in zip(r, r1)]) for vector in held)
+    return lambda r, r1: tuple(along(vector, [a - b for a, b in zip(r, r1)]) for vector in held)
 
 
 def angle_of(end: End) -> Callable[..., float] | None:
@@ -182,7 +182,7 @@ def angle_of(end: End) -> Callable[..., float] | None:
 
         def hinged(q, q1):
             scalar, *vector = relative(q, q1)
-            return 2 * math.atan2(_along(axis, vector), scalar)
+            return 2 * math.atan2(along(axis, vector), scalar)
 
         return hinged
     if end.rotation != JOINT:
@@ -193,12 +193,12 @@ def angle_of(end: End) -> Callable[..., float] | None:
 
     def joint(q, q1):
         director = directors(*relative(q, q1))[first : first + 3]
-        return math.atan2(_along(side, director), _along(zero, director))
+        return math.atan2(along(side, director), along(zero, director))
 
     return joint
 
 
-def _along(vector: Vector, components):
+def along(vector: Vector, components):
     """Return a component of a vector, without terms that are zero: a condition that fixes one state stays one."""
     return sum(a * x for a, x in zip(vector, components) if a != 0)
 

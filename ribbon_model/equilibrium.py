@@ -135,8 +135,13 @@ def moment_on_directors(q, lam) -> np.ndarray:
 
     2 M_i = lam . (q e_i).
     """
-    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
-    return np.array([sum(a * b for a, b in zip(lam, rate)) for rate in rates])
+    return np.array(moment_of(q, lam))
+
+
+def moment_of(q, lam) -> list:
+    """Return the same as a list of components, of numbers of any kind."""
+    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
+    return [sum(a * b for a, b in zip(lam, rate)) for rate in rates]
 
 
 def moment_on_axes(q, lam) -> np.ndarray:

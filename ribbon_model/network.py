@@ -40,9 +40,9 @@ from contin import (
     trace,
 )
 from contin.lowlevel import Collocation, Continuation, Undetermined
-from ribbon_model import ends, law_end, natural_state
+from ribbon_model import ends, law_end, loads, natural_state
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
-from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.section import NATURAL, Section
 from ribbon_model.shape import Shape, quaternions, shape_of
 
@@ -56,7 +56,7 @@ ASSEMBLY = "assembly"
 #: Displacements of a joint along the axes of the drawing, behind its name.
 MOVES = ("dx", "dy", "dz")
 #: Numbers of loads that act all along.
-_POTENTIALS = ("weight", "pressure", "field")
+POTENTIALS = ("weight", "pressure", "field")
 #: A quaternion, scalar first.
 Quaternion = tuple[float, float, float, float]
 
@@ -117,6 +117,11 @@ class Member:
         axes = np.array(directors(*self.frame)).reshape(3, 3)
         return np.hstack([q, np.array(self.place) + own[:, 4:] @ axes])
 
+    def followed_by(self, section: str, length: float, strains: Vector = (0.0, 0.0, 0.0)) -> Member:
+        """Return a member that goes on where this one ends."""
+        state = self.drawn([self.length])[0]
+        return Member(section, length, _numbers(state[4:]), _numbers(state[:4]), strains)
+
     def cut(self, fractions: Sequence[float]) -> list[Member]:
         """Return the pieces of a member that is cut at fractions of its length, which increase between 0 and 1."""
         places = [0.0, *fractions, 1.0]
@@ -141,13 +146,24 @@ def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member
     length = float(np.linalg.norm(along))
     if not 0 < length < math.inf:
         raise ValueError(f"a member from {list(begin)} to {list(end)} has no direction")
-    tangent = along / length
+    frame = frame_along(along / length, normal, f"the member from {list(begin)} to {list(end)}")
+    return Member(section, length, _numbers(begin), frame)
+
+
+def frame_along(tangent: Any, normal: Vector, what: str) -> Quaternion:
+    """Return the quaternion of a frame with a tangent, a unit vector, whose normal d2 is as near as possible to a direction.
+
+    Raises
+    ------
+    ValueError
+        The normal lies along the tangent of ``what``.
+    """
     across = np.array(ends.unit("normal", normal)) @ (np.eye(3) - np.outer(tangent, tangent))
     if np.linalg.norm(across) < LOOSE:
-        raise ValueError(f"normal: {list(normal)} lies along the member from {list(begin)} to {list(end)}")
+        raise ValueError(f"normal: {list(normal)} lies along {what}")
     across /= np.linalg.norm(across)
-    frame = quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0]
-    return Member(section, length, _numbers(begin), _numbers(frame))
+    frame: Quaternion = _numbers(quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0])
+    return frame
 
 
 def _numbers(values: Any) -> Any:
@@ -155,7 +171,7 @@ def _numbers(values: Any) -> Any:
     return tuple(map(float, values))
 
 
-@dataclass(frozen=True)
+@dataclass  # the axis is normalised when it is made, and then left as it is
 class JointEnd:
     """An end of a member at a joint.
 
@@ -184,7 +200,7 @@ class JointEnd:
     def __post_init__(self) -> None:
         if self.end not in (START, FINISH):
             raise ValueError(f"joint: end: {self.end!r} must be start or finish")
-        object.__setattr__(self, "axis", ends.unit("axis", self.axis))
+        self.axis = ends.unit("axis", self.axis)
 
 
 @dataclass(frozen=True)
@@ -267,7 +283,7 @@ class Network:
     >>> from ribbon_model.laws import ROD
     >>> rod = Section(ROD, {"B1": 1.0, "B2": 50.0, "C": 50.0, "kappa_n": 1.0})
     >>> half = Member("strip", math.pi, strains=(1.0, 0.0, 0.0))
-    >>> other = Member("strip", math.pi, tuple(half.drawn([math.pi])[0, 4:]), tuple(half.drawn([math.pi])[0, :4]), half.strains)
+    >>> other = half.followed_by("strip", math.pi, half.strains)
     >>> joints = {"P": Joint([JointEnd("a", FINISH), JointEnd("b")]), "Q": Joint([JointEnd("b", FINISH), JointEnd("a")])}
     >>> ring = Network({"strip": rod}, {"a": half, "b": other}, joints, numbers={"pressure": 0.0})
     >>> circle, how = ring.first_point()
@@ -335,7 +351,7 @@ class Network:
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the sections."""
         angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
-        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *_POTENTIALS)
+        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *POTENTIALS)
 
     @property
     def _prescribed(self) -> tuple[str, ...]:
@@ -349,8 +365,8 @@ class Network:
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        potentials = [name for name in _POTENTIALS if name in self.numbers]
-        always = [name for name in self.known if name not in _POTENTIALS]
+        potentials = [name for name in POTENTIALS if name in self.numbers]
+        always = [name for name in self.known if name not in POTENTIALS]
         values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
         own = {
             self._full(name, number): value
@@ -399,7 +415,7 @@ class Network:
             if key not in densities:
                 densities[key] = self._hamiltonian(member)
             segments.append(VariationalSegment(None, (*FRAME, *CENTRELINE), member.length, hamiltonian=densities[key]))
-        return SegmentedVariationalProblem(segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy())
+        return SegmentedVariationalProblem(segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy)
 
     def _hamiltonian(self, member: Member) -> Callable:
         section, length, name = self.sections[member.section], member.length, member.section
@@ -409,9 +425,8 @@ class Network:
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
 
         def hamiltonian(s, x, lam, p):
-            q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
-            rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
-            M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
+            q, n1, n2, n3 = x[:4], *lam[4:7]
+            M1, M2, M3 = moment_of(q, lam[:4])
             d = directors(*q)
             values = [getattr(p, each) for each in full]
             for number, strain in drawn.items():
@@ -423,18 +438,16 @@ class Network:
 
     def _distributed(self) -> Callable:
         """Return the potential per length of weight, pressure and field, as a function of (x, directors, p)."""
-        weight, pressure, couple = ("weight" in self.numbers, "pressure" in self.numbers, "field" in self.numbers)
-        down, normal, along, first = self.weight_direction, self.pressure_normal, self.field_direction, 3 * self.magnetized
+        pressure, couple = "pressure" in self.numbers, "field" in self.numbers
+        weight = loads.distributed(self.weight_direction if "weight" in self.numbers else None, None)
+        normal, along, first = self.pressure_normal, self.field_direction, 3 * self.magnetized
 
         def potential(x, d, p):
-            value = 0.0
-            if weight:
-                value = value - p.weight * (down[0] * x.x1 + down[1] * x.x2 + down[2] * x.x3)
+            value = weight(x, p)
             if pressure:
-                swept = ends.cross((x.x1, x.x2, x.x3), d[6:9])
-                value = value + p.pressure * (normal[0] * swept[0] + normal[1] * swept[1] + normal[2] * swept[2]) / 2
+                value = value + p.pressure * ends.along(normal, ends.cross((x.x1, x.x2, x.x3), d[6:9])) / 2
             if couple:
-                value = value - p.field * (along[0] * d[first] + along[1] * d[first + 1] + along[2] * d[first + 2])
+                value = value - p.field * ends.along(along, d[first : first + 3])
             return value
 
         return potential
@@ -470,14 +483,13 @@ class Network:
         order = list(self.members)
         known = []
         for each in joint.members:
-            q0 = self._drawn(each)[:4]
-            known.append((order.index(each.member), each, (float(q0[0]), *(-float(x) for x in q0[1:]))))
+            known.append((order.index(each.member), each, _numbers(self._drawn(each)[:4])))
 
         def read(a, b, p):
             found = []
-            for number, each, back in known:
+            for number, each, drawn in known:
                 x = (a if each.end == START else b)[number]
-                frame = product(x[:4], back)
+                frame = _joint_frame(x[:4], drawn)
                 if each.angle != 0:
                     half = p.assembly * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
                     frame = product(frame, (math.cos(half), *(-math.sin(half) * part for part in each.axis)))
@@ -503,13 +515,11 @@ class Network:
     def _floating(self) -> Callable:
         """Return the conditions that hold the rigid motions of a network that floats, at the first end of the first member."""
         member = next(iter(self.members.values()))
-        drawn, axes = member.drawn([0.0])[0], self._free_turns
-        back = (float(drawn[0]), *(-float(x) for x in drawn[1:4]))
+        drawn, axes = _numbers(member.drawn([0.0])[0]), self._free_turns
 
         def conditions(a):
-            turned = product(a[0][:4], back)[1:]
-            found = [x - float(y) for x, y in zip(a[0][4:7], drawn[4:])]
-            return found + [sum(u * v for u, v in zip(axis, turned) if u != 0) for axis in axes]
+            turned = _joint_frame(a[0][:4], drawn[:4])[1:]
+            return [x - y for x, y in zip(a[0][4:7], drawn[4:])] + [ends.along(axis, turned) for axis in axes]
 
         return conditions
 
@@ -527,6 +537,7 @@ class Network:
         parallel = all(np.linalg.norm(np.cross(first, ends.unit("direction", other))) < LOOSE for other in fixed)
         return [first] if parallel else []
 
+    @functools.cached_property
     def _end_energy(self) -> Callable | None:
         """Return the potential of dead forces and moments at joints, as a function of (a, b, p); None without one."""
         if not self.loads:
@@ -556,7 +567,7 @@ class Network:
             value = 0.0
             for number, read, direction in forces:
                 place = read(a, b, p)[0][1]
-                value = value - p.assembly * getattr(p, number) * sum(u * x for u, x in zip(direction, place) if u != 0)
+                value = value - p.assembly * getattr(p, number) * ends.along(direction, place)
             for number, factor, read, angle, frame_of in turns:
                 value = value - p.assembly * getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
             return value
@@ -643,7 +654,7 @@ class Network:
         stiffness = [
             known[self._full(name, number)] for name, section in self.sections.items() for number in section.stiffnesses
         ]
-        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in self.loads or name in _POTENTIALS]
+        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in self.loads or name in POTENTIALS]
         force = max(min(stiffness, default=1.0), *(abs(known[name]) for name in forces))
         length = max(member.length for member in self.members.values())
         lengths = [name for name in system.problem.state_names if name.startswith(CENTRELINE)]
@@ -695,10 +706,14 @@ class Network:
 
     def shapes(self, point: Point) -> dict[str, Shape]:
         """Return each member in space."""
-        strains, found = self.strains(point.system, point.x), {}
-        states = point.system.states(point.x)
+        system = point.system
+        return self.shapes_at(system.nodes, system.states(point.x), system.all_parameters(point.x))
+
+    def shapes_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> dict[str, Shape]:
+        """Return the same from states (K, n) at parts t (K,) of the lengths and the values of all parameters."""
+        strains, found = self.strains_at(t, states, p), {}
         for (name, member), piece in zip(self.members.items(), self.problem.pieces):
-            found[name] = shape_of(member.length * point.system.nodes, states[:, list(piece.at)], strains[name])
+            found[name] = shape_of(member.length * t, states[:, list(piece.at)], strains[name])
         return found
 
     def reactions(self, point: Point) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -710,12 +725,7 @@ class Network:
         found = {}
         for name in self.held:
             joint = self.joints[name]
-            origin = self.place(point, name)
-            force, moment = np.zeros(3), np.zeros(3)
-            for each in joint.members:
-                pull, couple, place = self._at_end(point, each)
-                force += pull
-                moment += couple + np.cross(place - origin, pull)
+            force, moment = self._on_ends(point, joint.members, self.place(point, name))
             for number, load in self.loads.items():
                 for where, direction, arm in load.forces:
                     if where == name:
@@ -728,17 +738,19 @@ class Network:
                         moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ axes)
             found[name] = force, moment
         if self.floats:
-            ((name, _), *_) = self.members.items()
-            whole = JointEnd(name, START)
-            force, moment, place = self._at_end(point, whole)
-            for joint in self.joints.values():
-                if any((each.member, each.end) == (name, START) for each in joint.members):
-                    for each in joint.members:
-                        if (each.member, each.end) != (name, START):
-                            pull, couple, other = self._at_end(point, each)
-                            force, moment = force + pull, moment + couple + np.cross(other - place, pull)
-            found["floating"] = force, moment
+            first = JointEnd(next(iter(self.members)))
+            at = (joint.members for joint in self.joints.values())
+            there = next((those for those in at if (first.member, START) in ((one.member, one.end) for one in those)), [first])
+            found["floating"] = self._on_ends(point, there, self._state(point, first)[4:7])
         return found
+
+    def _on_ends(self, point: Point, those: Sequence[JointEnd], origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sum of the forces on members at ends, and of the moments about a place."""
+        force, moment = np.zeros(3), np.zeros(3)
+        for each in those:
+            pull, couple, place = self._at_end(point, each)
+            force, moment = force + pull, moment + couple + np.cross(place - origin, pull)
+        return force, moment
 
     def _at_end(self, point: Point, each: JointEnd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return force and moment on a member at an end, and the place of that end.
@@ -770,12 +782,11 @@ class Network:
 
     def potential(self, point: Point) -> float:
         """Return the energy with the potential of all loads: that of which the index is."""
-        loaded = self._end_energy()
-        if loaded is None:
+        if self._end_energy is None:
             return point["energy"]
         states, rows = point.system.states(point.x), namedtuple("State", (*FRAME, *CENTRELINE))
         first, last = ([rows(*states[end, list(piece.at[:7])]) for piece in self.problem.pieces] for end in (0, -1))
-        return point["energy"] + float(loaded(first, last, SimpleNamespace(**point.parameters)))
+        return point["energy"] + float(self._end_energy(first, last, SimpleNamespace(**point.parameters)))
 
 
 def _known(what: str, name: str, names: Mapping) -> None:
@@ -792,7 +803,12 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
     if kind == RIGID:
         return list(turned)
     pair = ends.perpendicular(ends.unit("axis", axis))
-    return [sum(u * v for u, v in zip(vector, turned) if u != 0) for vector in pair]
+    return [ends.along(vector, turned) for vector in pair]
+
+
+def _joint_frame(q, drawn: Quaternion) -> tuple:
+    """Return J = q conj(q0) of an end that is drawn with the quaternion q0."""
+    return product(q, (drawn[0], *(-x for x in drawn[1:])))
 
 
 def _moved(x, arm: Vector) -> list:

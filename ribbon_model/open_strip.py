@@ -23,7 +23,7 @@ from contin import ContinError, ConvergenceError, Event, Point, ProblemError, Va
 from contin.lowlevel import Collocation, Continuation, Undetermined, shown
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
-from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.first_guesses import Guess
 from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
@@ -177,9 +177,8 @@ class OpenStrip:
         )
 
         def hamiltonian(t, x, lam, p):
-            q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
-            rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
-            M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
+            q, n1, n2, n3 = x[:4], *lam[4:7]
+            M1, M2, M3 = moment_of(q, lam[:4])
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
             return complementary(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + inside(t, x, lam[7:], p)
 

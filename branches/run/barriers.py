@@ -59,7 +59,7 @@ class Place:
 def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
     """Return the places of a result at which a stable state and a saddle are; unless ``quiet``, a line of progress is shown."""
     found = []
-    rows = list(_stable_rows(branch))
+    rows = list(chosen_rows(branch, stable=True))
     with Progress("places with barriers", len(rows), quiet) as progress:
         for row in rows:
             stage = int(branch.points["stage"][row])
@@ -73,12 +73,12 @@ def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
     return found
 
 
-def _stable_rows(branch: OpenBranch) -> Iterator[int]:
-    """Yield the stable points at ends of stages and labelled values, each set of numbers once."""
+def chosen_rows(branch: OpenBranch, stable: bool = False) -> Iterator[int]:
+    """Yield the points at ends of stages and labelled values, those that are ``stable`` or all, each set of numbers once."""
     seen: list[int] = []
     for event in branch.events:
         row = int(event["point"])
-        if begins(event) or event["label"] not in (b"EP", b"UZ") or event["index"] != 0:
+        if begins(event) or event["label"] not in (b"EP", b"UZ") or (stable and event["index"] != 0):
             continue
         if not any(branch.same_strip(row, other) for other in seen):
             seen.append(row)

@@ -5,12 +5,10 @@ They are looked for where a stage ends, and at the values that the scene labels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from branches.run.barriers import State, states_at
+from branches.run.barriers import State, chosen_rows, states_at
 from branches.run.progress import Progress
-from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, MeshControl, Search, Settings
 from contin.lowlevel import Searched, exact_text, further
@@ -39,7 +37,7 @@ class Place:
 def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
     """Return the search at each place; ``draws`` is the number of perturbations of each size, for every known state."""
     found = []
-    rows = list(_rows(branch))
+    rows = list(chosen_rows(branch))
     with Progress("places searched", len(rows), quiet) as progress:
         for row in rows:
             stage = int(branch.points["stage"][row])
@@ -50,16 +48,6 @@ def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
                 found.append(_searched(branch, row, known, draws))
             progress.part_done()
     return found
-
-
-def _rows(branch: OpenBranch) -> Iterator[int]:
-    """Yield the points at ends of stages and labelled values, each set of numbers once."""
-    seen: list[int] = []
-    for event in branch.events:
-        row = int(event["point"])
-        if not begins(event) and event["label"] in (b"EP", b"UZ") and not any(branch.same_strip(row, other) for other in seen):
-            seen.append(row)
-            yield row
 
 
 def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> Place:

@@ -11,15 +11,27 @@ import re
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.fields import StepConfig, Strict
 from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
-from ribbon_model.ends import DIRECTIONS, LOOSE
-from ribbon_model.network import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, Network, straight
+from ribbon_model.ends import DIRECTIONS
+from ribbon_model.network import (
+    BALL,
+    FINISH,
+    HINGE,
+    POTENTIALS,
+    RIGID,
+    START,
+    Joint,
+    JointEnd,
+    Load,
+    Member,
+    Network,
+    frame_along,
+    straight,
+)
 from ribbon_model.section import Section, section_of
-from ribbon_model.shape import quaternions
 
 #: An end of a strip, or a place along it, in words.
 _PLACE = re.compile(r"(\w+) (?:(start|finish)|at (0?\.\d+))")
@@ -201,17 +213,8 @@ class NetworkScene(StagedScene):
             kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
             joints[name] = Joint(ends, kind, joint.hinge or DIRECTIONS["width"])
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
-        for name, parts in pieces.items():  # what no joint of the scene joins is one strip still
-            for one, other in zip(parts, parts[1:]):
-                ends = [JointEnd(one, FINISH), JointEnd(other, START)]
-                if not any((each.member, each.end) == (one, FINISH) for joint in joints.values() for each in joint.members):
-                    joints[f"{one}_{other}"] = Joint(ends)
-            del name
-        numbers = dict(self.numbers)
-        for stage in self.stages:
-            numbers.update(
-                {name: 0.0 for name in (stage.follow, *stage.numbers) if name in ("weight", "pressure", "field")} | numbers
-            )
+        told = {name for stage in self.stages for name in (stage.follow, *stage.numbers)}
+        numbers = dict.fromkeys((name for name in POTENTIALS if name in told), 0.0) | self.numbers
         where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
         held = {name: end.end() for name, end in self.held.items()}
         return Network(sections, members, joints, held, loads, numbers, where.weight, where.pressure, where.field, first)
@@ -304,13 +307,5 @@ def _member(section: str, strip: StripConfig, before: dict[str, Member]) -> Memb
         return straight(section, strip.begin, strip.end, strip.normal)
     strains = (strip.bend / strip.length, 0.0, strip.twist / strip.length)
     if strip.after is not None:
-        last = before[strip.after]
-        state = last.drawn([last.length])[0]
-        return Member(section, strip.length, tuple(map(float, state[4:])), tuple(map(float, state[:4])), strains)
-    tangent = np.array(strip.along)
-    normal = np.array(strip.normal) - tangent * (tangent @ strip.normal)
-    if np.linalg.norm(normal) < LOOSE:
-        raise ValueError(f"normal: {list(strip.normal)} lies along the strip")
-    normal /= np.linalg.norm(normal)
-    frame = quaternions(np.array([[np.cross(normal, tangent), normal, tangent]]))[0]
-    return Member(section, strip.length, strip.begin, tuple(map(float, frame)), strains)
+        return before[strip.after].followed_by(section, strip.length, strains)
+    return Member(section, strip.length, strip.begin, frame_along(strip.along, strip.normal, "the strip"), strains)

@@ -66,9 +66,9 @@ class NetworkStage(OpenStage):
         return ("potential", *places, *reactions, *(("floating",) if network.floats else ()))
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
-        return {**point.parameters, **point.functionals, **self.found(point, np.empty(0))}
+        return {**point.parameters, **point.functionals, **self.found(point)}
 
-    def found(self, point: Point, states: np.ndarray) -> dict[str, float]:
+    def found(self, point: Point) -> dict[str, float]:
         network = self.strip
         found = {"potential": network.potential(point)}
         for joint in network.joints:
@@ -98,7 +98,7 @@ class NetworkStage(OpenStage):
         return "energy"
 
     def told_values(self, point: Point) -> list[tuple[str, float]]:
-        value = self.found(point, np.empty(0)).get(self.conjugate, point["energy"])
+        value = self.found(point).get(self.conjugate, point["energy"])
         return [(self.conjugate, value), ("energy", point["energy"])]
 
     def words(self, name: str) -> tuple[str, str]:

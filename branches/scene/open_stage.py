@@ -312,20 +312,19 @@ class OpenStage(Stage):
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
         """Loads that do not act are zero; angles that are not prescribed are those of the last end."""
-        states = point.system.states(point.x)
-        found = {**point.parameters, **point.functionals, **self.found(point, states)}
+        found = {**point.parameters, **point.functionals, **self.found(point)}
         absent = {name: 0.0 for name in names if name not in found}
         if set(ANGLES) & set(absent):
-            absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
+            absent |= dict(zip(ANGLES, angles_of(point.system.states(point.x)[-1, :4])))
         return absent | found
 
     def errors(self, point: Point) -> Mapping[str, float]:
-        found = errors_of(point, lambda at: {**at.functionals, **self.found(at, at.system.states(at.x))})
+        found = errors_of(point, lambda at: {**at.functionals, **self.found(at)})
         return found | point.errors
 
-    def found(self, point: Point, states: np.ndarray) -> dict[str, float]:
+    def found(self, point: Point) -> dict[str, float]:
         """Return the potential and the reactions."""
-        return {"potential": self.strip.potential(point), **self.strip.reactions_of(states)}
+        return {"potential": self.strip.potential(point), **self.strip.reactions(point)}
 
     # --- words ----------------------------------------------------------------------------------------------------------
 

@@ -8,12 +8,10 @@ from branches.draw.shapes import flat_across
 from branches.draw.strip import View
 from branches.store.files import StoreError
 from branches.store.open_branch import OpenBranch
-from ribbon_model.shape import Structure, shape_of
+from ribbon_model.shape import Structure
 
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
 _VIEW = View(-62.0, 25.0)
-#: Width of drawn strips over the longest length, without dimensions.
-_WIDTH = 0.06
 
 
 class NetworkBranch(OpenBranch):
@@ -22,13 +20,9 @@ class NetworkBranch(OpenBranch):
     def shape(self, point: int) -> Structure:
         """Return the strips at a kept point, in the order of the network's members, on the axes of the drawing."""
         t, states = self.states_at(point)
-        network, values = self._strip(point), [*self._numbers(point).values()]
-        strains = network.strains_at(t, states, np.array(values))
-        parts = []
-        for (name, member), piece in zip(network.members.items(), network.problem.pieces):
-            law = network.sections[member.section].form
-            parts.append(flat_across(shape_of(member.length * t, states[:, list(piece.at)], strains[name]), law))
-        return Structure(tuple(parts))
+        network, values = self._strip(point), np.array([*self._numbers(point).values()])
+        laws = [network.sections[member.section].form for member in network.members.values()]
+        return Structure(tuple(map(flat_across, network.shapes_at(t, states, values).values(), laws)))
 
     def strains(self, point: int) -> np.ndarray:
         """Networks have strains for each strip; raise StoreError."""
@@ -42,10 +36,6 @@ class NetworkBranch(OpenBranch):
         return None
 
     length_unit = ""
-
-    def drawn_width(self, strips: list, asked: float | None) -> float:
-        longest = max(part.arclength[-1] for strip in strips for part in strip.parts)
-        return super().drawn_width(strips, _WIDTH * longest if asked is None else asked)
 
     @property
     def up(self) -> tuple[float, float, float]:

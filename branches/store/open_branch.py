@@ -23,7 +23,7 @@ from ribbon_model.shape import Shape, interpolated, parts_of, shape_of
 
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
-#: Width of a drawn strip of unknown dimensions, over its length.
+#: Width of drawn strips of unknown dimensions, over the length of the longest.
 _WIDTH = 0.06
 
 
@@ -141,9 +141,10 @@ class OpenBranch(StoredBranch):
         return "weight" in self.scene.strip().parameters
 
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
+        parts = [part for strip in strips for part in parts_of(strip)]
         if asked is None:
-            asked = self.width_at(1.0, None) or _WIDTH
-        return min([asked, *(ROOM * widest(part) for strip in strips for part in parts_of(strip))])
+            asked = self.width_at(1.0, None) or _WIDTH * max(part.arclength[-1] for part in parts)
+        return min([asked, *(ROOM * widest(part) for part in parts)])
 
     # --- places ---------------------------------------------------------------------------------------------------------
 

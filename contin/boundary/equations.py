@@ -100,7 +100,7 @@ class BoundaryEquations(OnMesh):
 
     def _linearized(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Factors]:
         """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
-        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self._columns[1])
+        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self.problem.batch("boundary").columns(self._free))
         if self._components:
             field, factors = self._factored_apart(x, ends[0], Bordering(columns, rows))
             return self._residual(x, field, boundary), factors
@@ -144,8 +144,7 @@ class BoundaryEquations(OnMesh):
         parts = [self._part(component, of_field, entries, points) for component in self._components]
         integrals = np.empty((self.problem.integral_size, self.size))
         for q, row in enumerate(integrals):
-            slopes, own = np.zeros((self.gauss_times.size, of_field.width)), of_field.rows == n + q
-            slopes[:, of_field.places[own]] = entries[:, own]
+            slopes = of_field.block(entries, np.array([n + q]), np.arange(of_field.width))[:, 0]
             row[:] = self._to_nodes(self.gauss_weights[:, None] * slopes)
         corner = np.concatenate([at_ends[:, 2 * n :], integrals[:, self.state_size :]])
         corner = np.vstack([np.hstack([corner, columns[:, inside:].T]), rows[:, self.state_size :]])
@@ -155,23 +154,17 @@ class BoundaryEquations(OnMesh):
     def _part(self, component: Component, of_field: Columns, entries: Array, columns: Array) -> Part:
         """Return the rows of a component from the ``entries`` of the Jacobian, and ``columns`` (c, points, n) besides."""
         n, states, points, k = self._n, component.states, self.gauss_times.size, len(self.free)
-        count, at = len(states), np.full(n + self.problem.integral_size, -1)
-        at[states] = np.arange(count)
-        column = np.argsort(component.layout.order)
-        row, place = at[of_field.rows], of_field.places
-        own, other = (row >= 0) & (place < n), (row >= 0) & (place >= n)
-        jacobian = np.zeros((points, count, count))
-        jacobian[:, row[own], column[at[place[own]]]] = entries[:, own]
-        places, number = np.unique(place[other] - n, return_inverse=True)
-        slopes = np.zeros((points, count, len(places) + len(columns)))
-        slopes[:, row[other], number] = -self._h_points * entries[:, other]
-        slopes[:, :, len(places) :] = columns[:, :, states].transpose(1, 2, 0)
+        count = len(states)
+        jacobian = of_field.block(entries, states, states[component.layout.order])
+        places = np.unique(of_field.places[np.isin(of_field.rows, states) & (of_field.places >= n)])
+        by_parameters = -self._h_points[:, :, None] * of_field.block(entries, states, places)
+        slopes = np.concatenate([by_parameters, columns[:, :, states].transpose(1, 2, 0)], axis=2)
         local, none = np.empty((self.intervals, count * self._d, count * (self._d + 1))), np.empty((0, 0))
         border, ends = np.empty((self.intervals, 0, local.shape[2])), np.empty((0, count))
         around = Bordering(np.empty((0, points * count)), np.empty((0, (points + 1) * count)))
         given = component.layout, self.tables, self._h, jacobian, np.empty((1, 0, 2 * count)), around
         assemble(*given, Blocks(local, border, none, ends, ends), share(self.intervals, 0))
-        return Part(component, local, slopes.reshape(points * count, -1), np.append(places, k + np.arange(len(columns))))
+        return Part(component, local, slopes.reshape(points * count, -1), np.append(places - n, k + np.arange(len(columns))))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

@@ -358,13 +358,9 @@ def _jacobians(system: Collocation, x: Array) -> list[tuple[Indices, Array]]:
     entries = batch.entries(system.gauss_times, points, points[:0], system.all_parameters(x), columns)[1]
     for states in system.separate_states:
         own = states[states < count]
-        both, place = np.concatenate([own, count + own]), np.full(batch.count, -1)
-        place[both] = np.arange(len(both))
-        place[2 * count :] = len(both) + np.arange(batch.count - 2 * count)
-        kept = (place[columns.rows] >= 0) & (place[columns.places] >= 0)
-        jacobian = np.zeros((len(points), len(both) + batch.count - 2 * count, len(both)))
-        jacobian[:, place[columns.rows[kept]], place[columns.places[kept]]] = entries[:, kept]
-        found.append((own, jacobian))
+        both = np.concatenate([own, count + own])
+        rows = np.append(both, np.arange(2 * count, batch.count))  # and the integrands
+        found.append((own, columns.block(entries, rows, both)))
     return found
 
 

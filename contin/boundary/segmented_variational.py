@@ -197,7 +197,7 @@ class SegmentedVariationalProblem(VariationalProblem):
     def __reduce__(self) -> Any:
         """Carry the functions of segments as recordings, too, where no other process finds them by name."""
         make, (kind, stated) = super().__reduce__()
-        known: dict[int, Any] = {}
+        known: dict[Any, Any] = {}
         segments = [segment.portable(self.variation.parameters, known) for segment in self.segments]
         return make, (kind, {**stated, "segments": segments})
 

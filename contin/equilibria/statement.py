@@ -23,7 +23,7 @@ from contin.functions.signature import Arguments, Signature, argument_count, res
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
-from contin.problems.vector_field import returning
+from contin.problems.vector_field import combined, returning
 
 #: A rate below this part of the terms it may consist of is zero: solutions are known to 1e-12, and their rates, too.
 _AT_REST = 1e-8
@@ -394,12 +394,7 @@ def _of_whole(
     state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
 
     def reduced(u: Any, p: Any) -> Any:
-        known = [*u, *(getattr(p, name) for name in totals)]
-        states = []
-        for row in follow:
-            terms = [value if factor == 1 else factor * value for factor, value in zip(row, known) if factor]
-            states.append(sum(terms[1:], terms[0]))
-        values = function(state(*states), p)
+        values = function(state(*combined(follow, [*u, *(getattr(p, name) for name in totals)])), p)
         return values if kept is None else [values[i] for i in kept]
 
     return reduced

@@ -45,6 +45,20 @@ class Columns:
         """Number of columns of the Jacobian."""
         return self.inputs.size
 
+    def block(self, entries: Array, rows: Indices, places: Indices) -> Array:
+        """Return the derivatives of some values by some columns, shape (points, rows, places), from the entries of `Batch`.
+
+        ``entries`` (points, entries) are in the order of ``rows`` and ``places``.
+        """
+        row = np.full(1 + max(self.rows.max(initial=-1), rows.max(initial=-1)), -1)
+        column = np.full(self.width, -1)
+        row[rows], column[places] = np.arange(len(rows)), np.arange(len(places))
+        at_row, at_column = row[self.rows], column[self.places]
+        kept = (at_row >= 0) & (at_column >= 0)
+        found = np.zeros((len(entries), len(rows), len(places)))
+        found[:, at_row[kept], at_column[kept]] = entries[:, kept]
+        return found
+
     @functools.cached_property
     def request(self) -> Request:
         """What a batch is asked for values and derivatives by these inputs."""

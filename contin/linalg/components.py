@@ -27,7 +27,7 @@ from contin.linalg.condensation import Factorization
 from contin.linalg.dense import DenseFactors
 from contin.linalg.elimination import factorize
 from contin.linalg.layout import Blocks, Layout, layout
-from contin.linalg.segments import ALL, Share
+from contin.linalg.segments import share
 
 
 class Component(NamedTuple):
@@ -174,7 +174,7 @@ def _complemented(part: Part) -> Factorization:
     """Return the factors of K, with N in the place of boundary conditions."""
     local, n = part.local, len(part.component.states)
     intervals, _, width = local.shape
-    whole = Share(np.array([0, intervals]), 0, 1, ALL)
+    whole = share(intervals, 0)  # one segment
     blocks = Blocks(local, np.empty((intervals, 0, width)), np.empty((0, 0)), np.empty((n, n)), np.empty((n, n)))
     found = Factorization.unfilled(part.component.layout, blocks, whole)
     factors, corners, first, last, carried, _ = found.room

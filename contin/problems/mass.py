@@ -22,6 +22,7 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.iteration import MOST, root
+from contin.problems.vector_field import combined
 
 #: Singular values of a mass matrix below this part of the largest are zero: matrices are typed, or computed to round-off.
 _ZERO = 1e-12
@@ -87,7 +88,7 @@ class Mass:
     def rates_of(self, field: Function, arguments: int) -> Function:
         """Return the rates of the states that have some, as a function of ``arguments`` arguments: (u, p) or (t, u, p)."""
         rows = self.rates
-        return _of(lambda *given: _combined(rows, field(*given)), arguments)
+        return _of(lambda *given: combined(rows, field(*given)), arguments)
 
     def jacobian_of(self, jacobian: Function, arrays: bool) -> Function:
         """Return the derivatives of `rates_of` a field with these, which may take arrays."""
@@ -113,7 +114,7 @@ class Mass:
                 known = {**dict(zip(kept, u)), **dict(zip(found, z))}
                 return state(*(known[i] for i in range(len(names))))
 
-            z = root(lambda w: _combined(algebraic, field(*times, whole(w), p)), starts)
+            z = root(lambda w: combined(algebraic, field(*times, whole(w), p)), starts)
             return function(*times, whole(z), p)
 
         return _of(of_kept, arguments)
@@ -145,12 +146,3 @@ def _of(function: Callable[..., Any], count: int) -> Function:
     if count == 2:
         return lambda u, p: function(u, p)
     return lambda t, u, p: function(t, u, p)
-
-
-def _combined(rows: Sequence[Sequence[float]], values: Sequence[Any]) -> list[Any]:
-    """Return the products of rows and values; zeros and ones are not multiplied."""
-    results = []
-    for row in rows:
-        terms = [value if factor == 1 else factor * value for factor, value in zip(row, values) if factor]
-        results.append(sum(terms[1:], terms[0]))
-    return results

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -96,3 +96,12 @@ def scaled(field: Function, by: str, parts: int = 1) -> Function:
 def found_elsewhere(u: Named, p: Named) -> float:
     """Stand for a column that the discretized problem computes: it is no integral, and never called."""
     raise NotImplementedError
+
+
+def combined(rows: Sequence[Sequence[float]], values: Sequence[Any]) -> list[Any]:
+    """Return the products of rows and values; zeros and ones are not multiplied."""
+    results = []
+    for row in rows:
+        terms = [value if factor == 1 else factor * value for factor, value in zip(row, values) if factor]
+        results.append(sum(terms[1:], terms[0]))
+    return results

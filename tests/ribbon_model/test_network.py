@@ -24,12 +24,6 @@ def _changes(branch, name):
     return [(point[name], point.index_change) for point in branch if point.label in ("BP", "LP")]
 
 
-def _after(member: Member, length: float, strains=(0.0, 0.0, 0.0)) -> Member:
-    """A member that goes on where another one ends."""
-    end = member.drawn([member.length])[0]
-    return Member(member.section, length, tuple(end[4:]), tuple(end[:4]), strains)
-
-
 # --- closed forms ---------------------------------------------------------------------------------------------------------
 
 
@@ -152,7 +146,7 @@ def test_rings_that_are_covered_several_times(covers):
     """(m + B1 y / C)(m + B1 y / B2) = k^2 with y = kappa_n R - m: where rings buckle; k = m and k >= 1 double, k = 0 simple."""
     B2, C, m = 1.4, 0.7, covers
     half = Member("strip", math.pi * m, strains=(1.0, 0.0, 0.0))
-    other = _after(half, math.pi * m, half.strains)
+    other = half.followed_by("strip", math.pi * m, half.strains)
     joints = {
         "P": Joint([JointEnd("a", FINISH), JointEnd("b")]), "Q": Joint([JointEnd("b", FINISH), JointEnd("a")])
     }  # fmt: skip
@@ -178,7 +172,7 @@ def test_a_ring_under_pressure_until_it_touches():
     Half of the ring, whose ends stay in a plane of mirror symmetry.
     """
     quarter = Member("strip", math.pi / 2, strains=(1.0, 0.0, 0.0))
-    members = {"a": quarter, "b": _after(quarter, math.pi / 2, quarter.strains)}
+    members = {"a": quarter, "b": quarter.followed_by("strip", math.pi / 2, quarter.strains)}
     joints = {"A": Joint([JointEnd("a")]), "B": Joint([JointEnd("b", FINISH)])}
     joints["middle"] = Joint([JointEnd("a", FINISH), JointEnd("b")])
     held = {"A": CLAMP, "B": End(held=((0.0, 0.0, 1.0),))}
@@ -221,7 +215,7 @@ def test_a_cut_by_rigid_joints_changes_nothing(name, cuts):
     natural = (section.numbers["kappa_n"], 0.0, 0.0)
     places, members = [0.0, *cuts, 1.0], {}
     for number, (a, b) in enumerate(zip(places, places[1:])):
-        members[str(number)] = _after(last, b - a, natural) if number else Member("strip", b, strains=natural)  # noqa: F821
+        members[str(number)] = last.followed_by("strip", b - a, natural) if number else Member("strip", b, strains=natural)  # noqa: F821
         last = members[str(number)]
     joints = {"A": Joint([JointEnd("0")]), "B": Joint([JointEnd(str(len(cuts)), FINISH)])}
     joints |= {f"cut {i}": Joint([JointEnd(str(i), FINISH), JointEnd(str(i + 1))]) for i in range(len(cuts))}
