@@ -46,8 +46,8 @@ def parser():
         nargs="?",
         const=8,
         metavar="N",
-        help="look for further states of an open strip where its stages end and at labelled values, from N random guesses "
-        "beside each known state (default: 8)",
+        help="look for further states at labelled values, and where stages of an open strip end, from N random guesses beside "
+        "each known state (default: 8)",
     )
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
@@ -84,8 +84,8 @@ def _run(options) -> int:
         scene = load(options.config, options.set)
         for caution in next(iter(scene.scenes.values())).cautions:
             complain(f"caution: {caution}")
-        if options.search is not None and (scene.many or scene.KIND != "open strip"):
-            raise ConfigError("--search: is for a scene of one open strip")
+        if options.search is not None:
+            _check_search(scene)
         if scene.many:
             return _run_many(scene, options)
         path = output_path(options)
@@ -107,7 +107,7 @@ def _run(options) -> int:
     if outcome == "complete" and stages_of(scene)[0].has_barriers:
         _tell_barriers(path, display, options.quiet)
     if outcome == "complete" and options.search is not None:
-        _tell_further(path, display, options)
+        _tell_further(scene, path, display, options)
     return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
 
 
@@ -124,12 +124,33 @@ def _tell_barriers(path, display, quiet: bool) -> None:
         display.note("\n".join(lines))
 
 
-def _tell_further(path, display, options) -> None:
-    """Print the states of an open strip that its stages do not reach."""
-    from branches.run.further import report
+def _check_search(scene) -> None:
+    """Refuse a search that is not made.
+
+    Raises
+    ------
+    ConfigError
+    """
+    from branches.scene.fields import ConfigError
+
+    first = next(iter(scene.scenes.values()))
+    if first.KIND == "network" or (scene.many and first.KIND != "closed strip"):
+        raise ConfigError("--search: is for a scene of one open strip, or of closed strips")
+    if first.KIND == "closed strip" and not first.zeros.get("kappa_n"):
+        raise ConfigError("--search: closed strips are searched at labelled values of kappa_n: zeros: {kappa_n: [...]}")
+
+
+def _tell_further(scene, path, display, options) -> None:
+    """Print the states of strips that no stage or branch reaches."""
+    from branches.run import further, further_closed
     from branches.store.read import read_branch
 
-    display.note("\n".join(report(read_branch(path), options.search, options.quiet)))
+    first = next(iter(scene.scenes.values()))
+    if first.KIND == "closed strip":
+        lines = further_closed.report(path, first.zeros["kappa_n"], options.search, options.quiet)
+    else:
+        lines = further.report(read_branch(path), options.search, options.quiet)
+    display.note("\n".join(lines))
 
 
 def _run_many(sweep, options) -> int:
@@ -161,6 +182,8 @@ def _run_many(sweep, options) -> int:
     except (StoreError, ExecutorError, ContinError) as error:
         display.clear()
         return _refuse(error)
+    if outcome == "complete" and options.search is not None:
+        _tell_further(sweep, folder, display, options)
     return 0 if outcome == "complete" else EXIT_STOPPED_SHORT
 
 

@@ -74,8 +74,7 @@ def test_the_report(result, searched, monkeypatch):
 
 @pytest.mark.parametrize("scene, option, said", [
     (SCENE, "0", "--search 0: must be from 1 to 1000"),
-    ("m: 1\nn: 2\n", "2", "--search: is for a scene of one open strip"),
-    (SCENE.replace("0.3}", "[0.2, 0.3]}"), "2", "--search: is for a scene of one open strip"),
+    (SCENE.replace("0.3}", "[0.2, 0.3]}"), "2", "--search: is for a scene of one open strip, or of closed strips"),
 ])  # fmt: skip
 def test_what_cannot_be_searched(tmp_path, call, scene, option, said):
     (tmp_path / "scene.yaml").write_text(scene)
