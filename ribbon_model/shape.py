@@ -104,30 +104,6 @@ class Shape:
         return Shape(*map(np.concatenate, pairs))
 
 
-@dataclass(frozen=True)
-class Structure:
-    """Several strips in space.
-
-    Attributes
-    ----------
-    parts : tuple of Shape
-    """
-
-    parts: tuple[Shape, ...]
-
-    __repr__ = shown
-
-    @property
-    def centreline(self) -> np.ndarray:
-        """All centrelines, one after the other, shape (K, 3)."""
-        return np.concatenate([part.centreline for part in self.parts])
-
-
-def parts_of(shape: Shape | Structure) -> tuple[Shape, ...]:
-    """Return the strips of a structure, or the strip."""
-    return shape.parts if isinstance(shape, Structure) else (shape,)
-
-
 def frames(states) -> np.ndarray:
     """Return the directors (K, 3, 3), rows d1, d2, d3 on the lab axes, from states (K, >= 4) that begin with the quaternion.
 

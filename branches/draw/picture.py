@@ -21,6 +21,7 @@ _DOT = 8
 _WIDE, _HIGH = 3.4, 6.0
 #: Distance of a text from its place in points, beside half its size; and ways in which it is looked for.
 _AWAY, _WAYS = 8.0, 16
+_BLACK = "#000000"
 
 
 def figure(
@@ -133,6 +134,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
     stages = _stages(branch, columns[0])
     rows = np.flatnonzero(np.isin(branch.stage_of, stages))
     drawn = [(piece, curve) for piece, curve in branch.curves(*columns) if piece.stage in stages]
+    texts: list = []
     unknown = LINES[None][0] if all(piece.stable is None for piece in branch.pieces()) else UNKNOWN
     for piece, (x, y) in drawn:
         dashes, words = LINES[piece.stable] if piece.stable is not None else (unknown, LINES[None][1])
@@ -141,17 +143,20 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
         places = across[piece.rows], up[piece.rows]
         if dots:
             axes.scatter(*places, s=_DOT, facecolors=fill, edgecolors=branch.colour(piece.stage), lw=0.8, zorder=1.5)
+        index = branch.index_on(piece.rows)
+        if index > 0:
+            words = f"{words}, with the index"
+            texts.append(((x[len(x) // 2], y[len(y) // 2]), str(index), branch.colour(piece.stage)))
         if words not in seen:
             axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
     if len(branch.stages) > 1:
         for stage in stages:
             axes.plot([], [], color=branch.colour(stage), lw=1.8, label=f"stage {stage}")
-    texts = []
     for mark in branch.marks():
         if branch.stage_of[mark.row] in stages:
             place = across[mark.row], up[mark.row]
             _mark(axes, mark, place, seen)
-            texts.append((place, in_words(f"{place[0]:.4f}") if mark.label.told else ""))
+            texts.insert(0, (place, in_words(f"{place[0]:.4f}") if mark.label.told else "", _BLACK))
     for snap in branch.snaps():
         if snap.column == columns[0] and columns[1] in snap.to:
             target = snap.to[columns[1]] * branch.scene.factor(columns[1])
@@ -163,8 +168,8 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
     axes.margins(0.16, 0.12)
     here = [point for point in chosen if branch.stage_of[point] in stages]
     plain = [point for point in here if branch.points["label"][point] == b""]
-    axes.scatter(across[plain], up[plain], s=18, color="#000000", zorder=2)
-    texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point))) for point in here]
+    axes.scatter(across[plain], up[plain], s=18, color=_BLACK, zorder=2)
+    texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point)), _BLACK) for point in here]
     axes.autoscale_view()
     put(axes, texts, np.concatenate([*(curve.T for _, curve in drawn), np.column_stack([across, up])[rows]]))
     axes.legend(frameon=False, fontsize=11)
@@ -179,10 +184,10 @@ def _mark(axes, mark, place, seen: set) -> None:
 
 def _arrow(axes, place, target: float, released: str) -> None:
     """Draw an arrow from a fold that snaps to the stable state of least energy, and say how much lower that is."""
-    style = {"arrowstyle": "->", "color": "#000000", "lw": 1.2}
+    style = {"arrowstyle": "->", "color": _BLACK, "lw": 1.2}
     axes.annotate("", (place[0], target), place, arrowprops=style, zorder=2)
     words = f"snap: a stable state lies {in_words(released)} lower"
-    axes.plot([], [], color="#000000", ls="", marker=r"$\downarrow$", ms=12, label=words)  # in the legend: no curve is hidden
+    axes.plot([], [], color=_BLACK, ls="", marker=r"$\downarrow$", ms=12, label=words)  # in the legend: no curve is hidden
 
 
 def _once(name, seen: set):
@@ -197,11 +202,11 @@ def put(axes, texts, curves: np.ndarray) -> None:
     to_screen = axes.transData.transform
     dot = axes.figure.dpi / 72
     hidden = to_screen(curves) / dot
-    marks = [to_screen(place) / dot for place, _ in texts]
+    marks = [to_screen(place) / dot for place, *_ in texts]
     frame = axes.get_window_extent().padded(-2 * dot)
     low, high = np.array(frame.min) / dot, np.array(frame.max) / dot
     boxes: list[np.ndarray] = []
-    for (place, text), at in zip(texts, marks):
+    for (place, text, colour), at in zip(texts, marks):
         if not text:
             continue
         half = np.array([_WIDE * len(text), _HIGH])
@@ -217,4 +222,6 @@ def put(axes, texts, curves: np.ndarray) -> None:
             if best is None or cost < best[0]:
                 best = cost, middle
         boxes.append(np.array([best[1], half]))
-        axes.annotate(text, place, best[1] - at, textcoords="offset points", ha="center", va="center", fontsize=11)
+        axes.annotate(
+            text, place, best[1] - at, textcoords="offset points", ha="center", va="center", fontsize=11, color=colour
+        )

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from branches.draw.structure import Structure
 from ribbon_model.ends import DIRECTIONS
-from ribbon_model.shape import Shape, Structure
+from ribbon_model.shape import Shape
 
 #: A direction with a larger component along the tangent is that of a strip that stands upright.
 _UPRIGHT = 0.99
@@ -28,8 +29,10 @@ def standing(shape: Shape | Structure, up: tuple[float, float, float] = DIRECTIO
     return moved(shape, axes, np.zeros(3))
 
 
-def moved(shape, axes: np.ndarray, by: np.ndarray):
-    """Return a shape, or a structure, on new axes (rows), moved there."""
+def moved(shape, axes: np.ndarray, by: np.ndarray, scale: float = 1.0):
+    """Return a shape, or a structure, on new axes (rows), moved there, and then scaled."""
     if isinstance(shape, Structure):
-        return Structure(tuple(moved(part, axes, by) for part in shape.parts))
-    return replace(shape, centreline=shape.centreline @ axes.T + by, directors=shape.directors @ axes.T)
+        arms = [replace(one, arm=tuple(scale * x for x in one.arm)) for one in shape.fixtures]
+        return replace(shape, parts=tuple(moved(part, axes, by, scale) for part in shape.parts), fixtures=tuple(arms))
+    x = (shape.centreline @ axes.T + by) * scale
+    return replace(shape, arclength=shape.arclength * scale, centreline=x, directors=shape.directors @ axes.T)

@@ -37,8 +37,9 @@ class Mesh:
 
     @property
     def triangles(self) -> np.ndarray:
-        """Return the mesh as triangles, two for each quadrilateral, shape (2 Q, 3)."""
-        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+        """Return the mesh as triangles: two for each quadrilateral, one for those of which two corners are one."""
+        found = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+        return found[(found != np.roll(found, 1, axis=1)).all(axis=1)]
 
 
 def widest(shape: Shape) -> float:
@@ -107,6 +108,13 @@ def solid(shape: Shape, width: float, thickness: float) -> Mesh:
     if joint is None:
         quads += [_lid(here[0])[:, ::-1], _lid(beyond[-1])]
     return _mesh(points, joint, np.concatenate(quads))
+
+
+def together(meshes: Sequence[Mesh]) -> Mesh:
+    """Return several meshes as one, in which they keep their own vertices."""
+    before = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    quads = np.concatenate([mesh.quads + first for mesh, first in zip(meshes, before)])
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), quads, np.concatenate([mesh.stations for mesh in meshes]))
 
 
 def _lid(section: np.ndarray) -> np.ndarray:

@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ribbon_model.shape import parts_of
+from branches.draw.structure import parts_of, solids_of
 
-FRONT, BACK, EDGE = "#E8A33D", "#7A5195", "#2B1D0E"
+FRONT, BACK, EDGE, JOINT, SUPPORT = "#E8A33D", "#7A5195", "#2B1D0E", "#8FA3B5", "#4F5D6B"
+#: Paints of points by number: the side of a strip that looks to the eye, the other one, a line along an edge, a joint, a
+#: support.
+_PAINTS = (FRONT, BACK, EDGE, JOINT, SUPPORT)
+_SIDE, _BEHIND, _EDGE, _JOINT, _SUPPORT = range(5)
 #: Width of a strip of unknown dimensions, in units of L/2 pi. Ten times more covers the loop's own radius.
 WIDTH = 0.3
 #: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
@@ -81,7 +85,9 @@ def places(strip) -> np.ndarray:
 
 def reach_of(shapes, width: float, view: View = OBLIQUE) -> float:
     """Half the side of the square in which all these strips have room."""
-    corners = np.concatenate([part.surface(width).reshape(-1, 3) for shape in shapes for part in parts_of(shape)])
+    there = [part.surface(width).reshape(-1, 3) for shape in shapes for part in parts_of(shape)]
+    there += [solid.vertices for shape in shapes for _, solid in solids_of(shape, width)]
+    corners = np.concatenate(there)
     return 1.03 * float(np.abs(corners @ view.axes[:2].T).max())
 
 
@@ -102,7 +108,8 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     scale = fine / (2 * reach)
     line = min(_LINE * _FINE / scale, _LINE_PART * width)
     samples = [_samples(part, width, scale, line) for part in parts_of(shape)]
-    points, normals, at_edge = (np.concatenate(column) for column in zip(*samples))
+    samples += [_flat_samples(solid, _SUPPORT if one.held else _JOINT, scale) for one, solid in solids_of(shape, width)]
+    points, normals, paint = (np.concatenate(column) for column in zip(*samples))
     screen = points @ view.axes.T
     place, nearness = _places(screen, reach, fine)
     seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
@@ -111,14 +118,14 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     nearest[place[seen]] = seen
     covered = np.flatnonzero(nearest >= 0)
     canvas = np.zeros((fine * fine, 4), np.float32)
-    canvas[covered] = _colours(normals[nearest[covered]] @ view.axes.T, at_edge[nearest[covered]])
+    canvas[covered] = _colours(normals[nearest[covered]] @ view.axes.T, paint[nearest[covered]])
     canvas = canvas.reshape(pixels, _FINE, pixels, _FINE, 4).mean(axis=(1, 3))
     canvas[..., :3] /= np.maximum(canvas[..., 3:], 1e-6)
     return canvas.clip(0, 1)
 
 
 def _samples(shape, width: float, scale: float, line: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of the surface of a strip (K, 3), its unit normals there (K, 3), and whether they lie within a line at an edge."""
+    """Points of the surface of a strip (K, 3), its unit normals there (K, 3), and their paint: lines along edges are dark."""
     from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
     s, keep = np.unique(shape.arclength, return_index=True)
@@ -131,7 +138,19 @@ def _samples(shape, width: float, scale: float, line: float) -> tuple[np.ndarray
     across = np.linspace(-width / 2, width / 2, count)
     points = middle[:, None] + across[:, None] * ruling[:, None]
     normals = np.repeat(normal / np.linalg.norm(normal, axis=1)[:, None], count, axis=0)
-    return points.reshape(-1, 3), normals, np.tile(width / 2 - np.abs(across) < line, len(fine))
+    return points.reshape(-1, 3), normals, np.tile(np.where(width / 2 - np.abs(across) < line, _EDGE, _SIDE), len(fine))
+
+
+def _flat_samples(mesh, paint: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (K, 3) of the flat quadrilaterals of a mesh, their unit normals (K, 3), and one paint for all."""
+    corners = mesh.vertices[mesh.quads]
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max()
+    at = np.linspace(0, 1, math.ceil(longest * scale * _DENSE) + 2)
+    weights = np.stack([np.outer(1 - at, 1 - at), np.outer(at, 1 - at), np.outer(at, at), np.outer(1 - at, at)], axis=-1)
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    points = np.einsum("abi,qij->qabj", weights, corners)
+    return points.reshape(-1, 3), np.repeat(normals, at.size**2, axis=0), np.full(len(corners) * at.size**2, paint)
 
 
 def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
@@ -141,13 +160,13 @@ def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
     return np.where(inside, pixel[:, 1] * fine + pixel[:, 0], -1), screen[:, 2].astype(np.float32)
 
 
-def _colours(normals, at_edge) -> np.ndarray:
-    """Lit colours (K, 4) of the side that is seen, from normals on the axes of a view."""
+def _colours(normals, paint) -> np.ndarray:
+    """Lit colours (K, 4) of the side that is seen, from normals on the axes of a view and the paint of each point."""
     from matplotlib.colors import to_rgb
 
-    facing = normals[:, 2]
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LAMP)
+    light[paint == _EDGE] = 1.0
+    paint = np.where((paint == _SIDE) & (normals[:, 2] <= 0), _BEHIND, paint)
     colours = np.ones((len(normals), 4), np.float32)
-    colours[:, :3] = np.where((facing > 0)[:, None], to_rgb(FRONT), to_rgb(BACK)) * light[:, None]
-    colours[at_edge, :3] = to_rgb(EDGE)
+    colours[:, :3] = np.array([to_rgb(colour) for colour in _PAINTS])[paint] * light[:, None]
     return colours

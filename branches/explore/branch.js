@@ -168,11 +168,17 @@ class Branch {
     return result;
   }
 
-  /** The closed strip at s, its axis upright and its middle at the origin: stations one after the other, the last before the first. */
+  /** The closed strip at s, its axis upright and its middle at the origin: stations one after the other, the last before the first.
+   * Open strips go there and back; several of them have `sizes`, the numbers of their stations, and `fixtures`. */
   strip(s) {
     if (this.circle) return placed(planar(this.m), [1, 0, 0]);
-    const part = stations(this.states(s), this.shapes.nodes);
-    if (this.domain === "open") return open(part);
+    const states = this.states(s),
+      parts = this.shapes.channels / CHANNELS;
+    if (this.domain === "open") {
+      const each = Array.from({ length: parts }, (_, i) => stations(states, this.shapes.nodes, i, parts));
+      return open(each, this.fixtures);
+    }
+    const part = stations(states, this.shapes.nodes);
     if (this.domain === "loop") return flattened(part.slice(0, -1));
     if (!this.ruled) part.forEach((station) => (station.eta = 0));
     if (this.domain === "half loop") return placed(mirrored(part).slice(0, -1));

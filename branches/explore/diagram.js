@@ -38,7 +38,7 @@ function specialPoints() {
     type: "scatter",
     mode: "markers+text",
     text: found.map(({ name }) => name && `\u2002${name}\u2002`), // beside the marker of the present place, too
-    textposition: found.map(({ side }) => `middle ${side}`),
+    textposition: found.map(({ side }) => `${STRIPS ? "middle" : "top"} ${side}`),
     textfont: { size: 11.5, color: colour("ink") },
     x: found.map((mark) => mark.x),
     y: found.map((mark) => mark.y),
@@ -54,6 +54,30 @@ function specialPoints() {
   };
 }
 
+/** The index on the pieces of stages: a number above the middle of each unstable one. */
+function indexTexts() {
+  const found = [];
+  for (const branch of DATA.told ? now.family.branches : [])
+    for (let i = 0, first = 0; i + 1 < branch.size; i++) {
+      const index = branch.index(i + 0.5);
+      if (i + 2 < branch.size && branch.index(i + 1.5) === index) continue;
+      const middle = branch.fromWay((branch.toWay(first) + branch.toWay(i + 1)) / 2);
+      const [from, to] = [now.x, now.y].map((name) => [branch.value(name, middle), branch.value(name, Math.min(middle + 0.1, branch.size - 1))]),
+        side = (from[1] - from[0]) * (to[1] - to[0]) > 0 ? "left" : "right"; // above the line
+      if (index > 0) found.push({ index, side, x: from[0], y: to[0], tint: hueOf(branch).tint });
+      first = i + 1;
+    }
+  return {
+    ...QUIET,
+    mode: "text",
+    x: found.map(({ x }) => x),
+    y: found.map(({ y }) => y),
+    text: found.map(({ index }) => `<b>${index}</b>`),
+    textposition: found.map(({ side }) => `top ${side}`),
+    textfont: { size: 11.5, color: found.map(({ tint }) => tint) },
+  };
+}
+
 const QUIET = { type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false };
 
 /** What is drawn of the branches themselves, in pictures too. */
@@ -65,7 +89,7 @@ const branchTraces = (groups) => [
 function diagramTraces() {
   const line = { color: colour("front"), width: 9, simplify: false };
   const halo = { ...QUIET, ...now.branch.line(now.x, now.y), line, opacity: 0.38 };
-  return [halo, ...branchTraces(lines()), points(), specialPoints()];
+  return [halo, ...branchTraces(lines()), points(), indexTexts(), specialPoints()];
 }
 
 function diagramLayout() {

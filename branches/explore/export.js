@@ -66,7 +66,7 @@ function diagramFigure(paper) {
   layout.margin = { ...MARGIN, r: 24, t: 20, b: 160 };
   layout.xaxis.range = [...shownRange("x")];
   layout.yaxis.range = [...shownRange("y")];
-  return { data: [...branchTraces(groups), specialPoints(), ...entries, ...second], layout };
+  return { data: [...branchTraces(groups), indexTexts(), specialPoints(), ...entries, ...second], layout };
 }
 
 /** The strip as shown, or the profiles: a figure of its own. */

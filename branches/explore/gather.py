@@ -6,13 +6,12 @@ import math
 from functools import partial
 from pathlib import Path
 
-from branches.explore import open_strips, profiles, strips
+from branches.explore import profiles, staged, strips
 from branches.graph.stored import DIAGRAM, read_any
 from branches.run.executor import executor, run_jobs
 from branches.run.progress import Progress
-from branches.store.command import typed
 from branches.store.files import StoreError
-from branches.store.layout import CLOSED, OPEN
+from branches.store.layout import CLOSED
 from branches.store.read import read_branch
 
 #: Ending of the files that `contin.save` writes.
@@ -66,15 +65,9 @@ def left_out(data: dict) -> list[dict]:
 
 def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
     """Return the data of a page of strips, of the kind of the first one."""
-    pages = {CLOSED: _of_closed_strips, OPEN: _of_open_strips}
-    kind = read_branch(files[0]).scene.KIND
-    if kind not in pages:
-        raise StoreError(f"{str(files[0])!r} is of a {kind}, which pages do not show; {typed('plot')} {files[0]} draws it")
-    return pages[kind](files, titles, progress)
-
-
-def _of_open_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
-    return open_strips.gathered(files, next(filter(None, titles), ""))
+    if read_branch(files[0]).scene.KIND == CLOSED:
+        return _of_closed_strips(files, titles, progress)
+    return staged.gathered(files, next(filter(None, titles), ""))
 
 
 def _of_closed_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:

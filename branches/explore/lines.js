@@ -3,7 +3,7 @@
 
 const WAVES = 7; // colours of wavenumbers, --wave1 ... in the style sheet
 const STYLES = { stable: ["solid", 3.4], unstable: ["5px,3px", 1.5], unknown: ["solid", 1.5] };
-const STYLE_WORDS = { stable: "stable", unstable: "unstable", unknown: "stability not known" };
+const STYLE_WORDS = { stable: "stable", unstable: DATA.told ? "unstable, with its index" : "unstable", unknown: "stability not known" };
 const SYMBOLS = {
   circle: ["circle", 7, "meets a flat ring", "●"],
   fold: ["star", 12, "fold", "★"],
@@ -52,12 +52,12 @@ function lines() {
 
 const strokeOf = ({ tint, kind }) => ({ color: tint, dash: STYLES[kind][0], width: STYLES[kind][1], simplify: false });
 
-/** The name beside a fold of a strip, on the side to which its branch does not go. */
-function nameAt(branch, { kind, point }) {
+/** The name beside a special point, of closed strips beside a fold, on the side to which its branch does not go. */
+function nameAt(branch, { kind, point, tag }) {
   const x = branch.columns[now.x],
     rises = x[point] > x[Math.max(point - 1, 0)],
     room = (range.x[1] - x[point]) / (range.x[1] - range.x[0]) > 60 / $("diagram").clientWidth; // pixels of a name
-  return { name: STRIPS && kind === "fold" ? nameOf(branch) : "", side: rises && room ? "right" : "left" };
+  return { name: tag || (STRIPS && kind === "fold" ? nameOf(branch) : ""), side: rises && room ? "right" : "left" };
 }
 
 /** Labelled points of the family that have a symbol. */

@@ -27,6 +27,8 @@ WORDS = {
     "branches": {"hue": "branch", "state": "The states at the chosen point"},
 }
 WORDS["open"] = {"hue": "stage", "state": WORDS["strips"]["state"]}
+#: Width of strips in percent of their length, at first; that of open strips is that of pictures.
+_WIDTHS = {"strips": "3", "branches": "3", "open": "6"}
 #: Classes of the page, by which parts of it are hidden.
 CLASSES = {"strips": "strips", "branches": "branches", "open": "branches of-open"}
 
@@ -47,7 +49,7 @@ def assemble(data: dict) -> str:
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip
-    parts |= {"kind": CLASSES[data["kind"]]} | WORDS[data["kind"]]
+    parts |= {"kind": CLASSES[data["kind"]], "width": _WIDTHS[data["kind"]]} | WORDS[data["kind"]]
     pieces = template.split("{{")
     filled = [pieces[0]]
     for piece in pieces[1:]:

@@ -9,7 +9,7 @@ function readOut() {
   const tag = `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`;
   const rows = [
     ["branch", escaped(nameOf(branch))],
-    ...COLUMNS.map((name) => [AXES.get(name).brief, digitsAt(branch, name, s), name]),
+    ...[...new Set([...COLUMNS, ...(DATA.told ? [now.x, now.y] : [])])].map((name) => [AXES.get(name).brief, digitsAt(branch, name, s), name]),
     ...(STRIPS || branch.hasIndex ? [["stability", tag, "stability"]] : []),
     ...(STRIPS && branch.ruled && !branch.leftOut ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
     ["point", pointName(branch, s), "point"],

@@ -13,10 +13,10 @@ const apply = (m, a) => [dot(m[0], a), dot(m[1], a), dot(m[2], a)];
 
 // --- from states to a closed strip ---------------------------------------------------------------------------------
 
-/** Stations {x, d: [d1, d2, d3], eta} of a part, from states at its nodes. */
-function stations(states, nodes) {
+/** Stations {x, d: [d1, d2, d3], eta} of a part, from states at its nodes; those of `parts` strips stand side by side. */
+function stations(states, nodes, part = 0, parts = 1) {
   return Array.from({ length: nodes }, (_, k) => {
-    const [q0, q1, q2, q3, eta, x, y, z] = states.subarray(k * CHANNELS, (k + 1) * CHANNELS),
+    const [q0, q1, q2, q3, eta, x, y, z] = states.subarray((k * parts + part) * CHANNELS, (k * parts + part + 1) * CHANNELS),
       n = Math.hypot(q0, q1, q2, q3);
     return { x: [x, y, z], d: directors(q0 / n, q1 / n, q2 / n, q3 / n), eta };
   });
@@ -99,13 +99,13 @@ function planar(m) {
   });
 }
 
-/** An open strip, there and back, so that nothing joins its ends: its middle at the origin, the normal of its first end up. */
-function open(part) {
-  const ends = [0, 1, 2].map((i) => part.map(({ x }) => x[i])),
-    middle = ends.map((values) => (Math.min(...values) + Math.max(...values)) / 2),
-    turn = (a) => [a[2], a[0], a[1]],
-    turned = part.map(({ x, d, eta }) => ({ x: turn(along(x, -1, middle)), d: d.map(turn), eta }));
-  return flattened(turned.concat([...turned].reverse()));
+/** Open strips, each there and back, so that nothing joins its ends, with their joints and supports. */
+function open(parts, fixtures) {
+  const strip = flattened(parts.flatMap((part) => [...part, ...[...part].reverse()]));
+  strip.sizes = parts.map((part) => 2 * part.length);
+  const first = parts.map((_, i) => strip.sizes.slice(0, i).reduce((a, b) => a + b, 0));
+  strip.fixtures = fixtures.map((one) => ({ ...one, station: first[one.part] + (one.last ? parts[one.part].length - 1 : 0) }));
+  return strip;
 }
 
 /** Stations as one flat array, the middle at the origin, `axis` (else the normal of the enclosed area) along z, d3(0) along y. */

@@ -13,7 +13,7 @@ const FAMILIES = DATA.families.map((family) => ({
   ],
 }));
 const AXES = new Map(DATA.axes.map(([name, title, brief]) => [name, { title, brief }]));
-const COLUMNS = [...AXES.keys()].filter((name) => name !== "elastic" && name !== "index"); // in read-outs
+const COLUMNS = DATA.told || [...AXES.keys()].filter((name) => name !== "elastic" && name !== "index"); // in read-outs
 const now = { family: FAMILIES[0], branch: null, s: 0, playing: false, x: DATA.shown[0], y: DATA.shown[1] };
 
 // --- words ---------------------------------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 "use strict";
 // The strip in space, a lit mesh drawn by plotly; flat polygons where there is no WebGL, in small pictures and in SVG.
 
-const EYE = { x: 0.78, y: -1.02, z: 0.8 };
+const [x0, y0, z0] = DATA.eye || [0.78, -1.02, 0.8],
+  EYE = { x: x0, y: y0, z: z0 };
 const flat = !hasWebGL();
 let flatEye = EYE;
 
@@ -12,8 +13,15 @@ function hasWebGL() {
 
 /** Width of the strip in units of L / 2 pi. */
 const width = () => (Number($("width").value) / 100) * 2 * Math.PI;
-/** A tight coil is drawn larger than to scale, but smaller than a single loop. */
-const scaleOf = (strip) => 0.86 / reach(strip) ** 0.6;
+/** A tight coil is drawn larger than to scale, but smaller than a single loop; open strips are all drawn to one scale. */
+const scaleOf = (strip) => DATA.scale || 0.86 / reach(strip) ** 0.6;
+
+const LIT = {
+  hoverinfo: "skip",
+  showscale: false,
+  lighting: { ambient: 0.52, diffuse: 0.75, specular: 0.28, roughness: 0.45, fresnel: 0.12 },
+  lightposition: { x: 3000, y: -4000, z: 9000 },
+};
 
 function ribbonTraces(strip) {
   const scale = scaleOf(strip),
@@ -24,14 +32,17 @@ function ribbonTraces(strip) {
     {
       type: "mesh3d",
       ...mesh,
-      ...triangles(n),
+      ...triangles(strip),
       vertexcolor: sides,
-      hoverinfo: "skip",
-      showscale: false,
-      lighting: { ambient: 0.52, diffuse: 0.75, specular: 0.28, roughness: 0.45, fresnel: 0.12 },
-      lightposition: { x: 3000, y: -4000, z: 9000 },
+      flatshading: Boolean(strip.sizes), // narrow strips are dark if their normals are means with those of their edges
+      ...LIT,
     },
   ];
+  if (strip.fixtures && strip.fixtures.length) {
+    const { place, corners, held } = fixtureMesh(strip, width(), scale),
+      tints = held.flatMap((one) => Array(4).fill(colour(one ? "support" : "joint")));
+    traces.push({ type: "mesh3d", ...place, ...corners, vertexcolor: tints, flatshading: true, ...LIT });
+  }
   if ($("triads").checked)
     triadLines(strip, scale).forEach((line, i) =>
       traces.push({
@@ -104,7 +115,8 @@ async function updateState() {
     mesh = sheets(strip, width(), scale),
     n = count(strip);
   if (4 * n !== $("ribbon").data[0].x.length) return Plotly.react("ribbon", ribbonTraces(strip), $("ribbon").layout);
-  const drawn = $("triads").checked ? [mesh, ...triadLines(strip, scale)] : [mesh];
+  const joints = strip.fixtures && strip.fixtures.length ? [fixtureMesh(strip, width(), scale).place] : [],
+    drawn = [mesh, ...joints, ...($("triads").checked ? triadLines(strip, scale) : [])];
   return Plotly.restyle(
     "ribbon",
     { x: drawn.map((one) => one.x), y: drawn.map((one) => one.y), z: drawn.map((one) => one.z) },
@@ -113,7 +125,7 @@ async function updateState() {
 }
 
 const eyeNow = () => {
-  const { x, y, z } = flat ? flatEye : $("ribbon").layout.scene.camera.eye;
+  const { x, y, z } = flat || !$("ribbon").layout ? flatEye : $("ribbon").layout.scene.camera.eye;
   return [x, y, z];
 };
 
@@ -151,12 +163,12 @@ function turnByKey(event) {
 
 /** The fill of a polygon as a function: its side's colour, darker where it faces away from the light. */
 function fills() {
-  const [front, rear] = ["front", "rear"].map((side) =>
+  const parts = (side) =>
     colour(side)
       .match(/\w\w/g)
-      .map((part) => parseInt(part, 16)),
-  );
-  return (polygon) => `rgb(${(polygon.front ? front : rear).map((part) => Math.round(part * polygon.shade)).join(",")})`;
+      .map((part) => parseInt(part, 16));
+  const known = Object.fromEntries(["front", "rear", "joint", "support"].map((side) => [side, parts(side)]));
+  return ({ side, shade }) => `rgb(${known[side].map((part) => Math.round(part * shade)).join(",")})`;
 }
 
 /** A picture of the strip without WebGL. */

@@ -10,13 +10,27 @@ function reach(strip) {
   return most;
 }
 
+/** The number of the station after each one, of every so many: the first of a strip follows its last one. */
+function following(strip, every = 1) {
+  const next = [];
+  for (const size of strip.sizes || [count(strip)]) {
+    const first = next.length,
+      n = Math.ceil(size / every);
+    for (let k = 0; k < n; k++) next.push(first + ((k + 1) % n));
+  }
+  return next;
+}
+
 /** The widest strip whose rulings (6a) do not cross: 2 / max |eta'|. */
 function widest(strip) {
-  const n = count(strip),
-    eta = (k) => strip[(k % n) * STATION + 12];
+  const eta = (k) => strip[k * STATION + 12],
+    place = (k) => strip.subarray(k * STATION, k * STATION + 3);
   let most = 0;
-  for (let k = 0; k < n; k++) most = Math.max(most, Math.abs(eta(k + 1) - eta(k)));
-  return (2 * 2 * Math.PI) / (n * most);
+  following(strip).forEach((next, k) => {
+    const step = Math.hypot(...along(place(next), -1, place(k)));
+    if (step > 0) most = Math.max(most, Math.abs(eta(next) - eta(k)) / step);
+  });
+  return 2 / most;
 }
 
 /**
@@ -56,22 +70,62 @@ function sheets(strip, width, scale, gap = 0.004) {
 }
 
 /** Corners of the triangles of `sheets`. */
-function triangles(n) {
+function triangles(strip) {
   const i = [],
     j = [],
     k = [];
-  for (let a = 0; a < n; a++) {
+  following(strip).forEach((next, a) => {
     const p = 4 * a,
-      q = 4 * ((a + 1) % n);
+      q = 4 * next;
     i.push(p, p + 1, p + 2, p + 3);
     j.push(p + 1, q + 1, q + 2, q + 2);
     k.push(q, q, p + 3, q + 3);
-  }
+  });
   return { i, j, k };
 }
 
+/** Quadrilaterals of the joints and supports: corners, and whether they are of a support. A profile is turned around an axis. */
+function fixtureQuads(strip, width, scale) {
+  return (strip.fixtures || []).flatMap(({ station, arm, axes, sides, profile, held }) => {
+    const at = (i) => strip.subarray(station * STATION + i, station * STATION + i + 3),
+      turn = (a) => a.reduce((sum, part, i) => along(sum, part, at(3 + 3 * i)), [0, 0, 0]),
+      place = along(turn(arm), 1, at(0)),
+      [ahead, ...across] = axes.map(turn);
+    const rings = profile.map(([height, radius]) =>
+      Array.from({ length: sides }, (_, k) => {
+        const angle = (2 * Math.PI * (k + 0.5)) / sides,
+          aside = along(along([0, 0, 0], Math.cos(angle), across[0]), Math.sin(angle), across[1]);
+        return along([0, 0, 0], scale, along(along(place, width * height, ahead), width * radius, aside));
+      }),
+    );
+    return rings.slice(1).flatMap((ring, r) =>
+      ring.map((corner, k) => {
+        const next = (k + 1) % sides;
+        return { corners: [rings[r][k], rings[r][next], ring[next], corner], held };
+      }),
+    );
+  });
+}
+
+/** The same as a mesh: coordinates, corners of triangles, and whether each vertex is of a support. */
+function fixtureMesh(strip, width, scale) {
+  const quads = fixtureQuads(strip, width, scale),
+    points = quads.flatMap(({ corners }) => corners),
+    [x, y, z] = [0, 1, 2].map((i) => Float32Array.from(points, (point) => point[i])),
+    first = quads.map((_, q) => 4 * q);
+  return {
+    place: { x, y, z },
+    corners: {
+      i: first.flatMap((q) => [q, q]),
+      j: first.flatMap((q) => [q + 1, q + 2]),
+      k: first.flatMap((q) => [q + 2, q + 3]),
+    },
+    held: quads.map(({ held }) => held),
+  };
+}
+
 /**
- * The strip as flat polygons seen from `eye`, the farthest first, each with the brightness 0 ... 1 of its side `front`.
+ * The strip as flat polygons seen from `eye`, the farthest first, each with its side and the brightness 0 ... 1.
  * For small pictures, for vector graphics, and where there is no WebGL.
  */
 function polygons(strip, width, scale, eye, every = 1) {
@@ -80,17 +134,23 @@ function polygons(strip, width, scale, eye, every = 1) {
     top = cross(view, right),
     light = unit([0.3, -0.4, 0.85]);
   const rows = edges(strip, width, scale, every),
+    next = following(strip, every),
     result = [];
-  rows.forEach(([a, b, normal], k) => {
-    const [c, d] = rows[(k + 1) % rows.length],
-      corners = [a, b, d, c];
+  const add = (corners, normal, side) =>
     result.push({
       points: corners.map((p) => [dot(p, right), -dot(p, top)]),
       depth: corners.reduce((sum, p) => sum + dot(p, view), 0),
-      front: dot(normal, view) > 0,
+      side,
       shade: 0.5 + 0.5 * Math.abs(dot(normal, light)),
     });
+  rows.forEach(([a, b, normal], k) => {
+    const [c, d] = rows[next[k]];
+    add([a, b, d, c], normal, dot(normal, view) > 0 ? "front" : "rear");
   });
+  for (const { corners, held } of fixtureQuads(strip, width, scale)) {
+    const normal = unit(cross(along(corners[2], -1, corners[0]), along(corners[3], -1, corners[1])));
+    if (dot(normal, view) > 0) add(corners, normal, held ? "support" : "joint");
+  }
   return result.sort((p, q) => p.depth - q.depth);
 }
 

@@ -57,8 +57,8 @@ def parser() -> Parser:
     )  # fmt: skip
     parser.add_argument(
         "--length", type=Quantity("m"), metavar="X",
-        help="length of the strip in the files, a number, or one with a unit as in 20cm, which becomes 0.2 (default: that of "
-        "the scene in m, or 1)",
+        help="length of the strip in the files (of a network, of its longest one): a number, or one with a unit as in 20cm, "
+        "which becomes 0.2 (default: that of the scene in m, or 1)",
     )  # fmt: skip
     parser.add_argument(
         "--width", type=Quantity("m"), metavar="X",
@@ -202,17 +202,26 @@ def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
 
 def _fields(shape: Shape, strains) -> dict[str, ndarray]:
     """Return the values at the nodes of the centreline that VTK files hold."""
-    fields = {"s": shape.arclength, "d1": shape.directors[:, 0], "d2": shape.directors[:, 1], "d3": shape.directors[:, 2]}
+    import numpy as np
+
+    from branches.draw.structure import parts_of
+
+    parts = parts_of(shape)
+    directors = np.concatenate([part.directors for part in parts])
+    strips = np.repeat(np.arange(1, len(parts) + 1), [len(part.arclength) for part in parts])
+    fields = {"strip": strips} if len(parts) > 1 else {}
+    fields |= {"s": np.concatenate([part.arclength for part in parts])}
+    fields |= {f"d{i + 1}": directors[:, i] for i in range(3)}
     return fields | {f"omega_{i + 1}": strains[:, i] for i in range(3)}
 
 
 def _table(shape: Shape, strains) -> bytes:
     """Return arclength, centreline, directors and strains as comma-separated values with a line of names."""
-    import numpy as np
-
-    names = ["s", "x", "y", "z", *(f"d{i}_{axis}" for i in (1, 2, 3) for axis in "xyz"), "omega_1", "omega_2", "omega_3"]
-    columns = np.column_stack([shape.arclength, shape.centreline, shape.directors.reshape(-1, 9), strains]).T
-    return _csv(dict(zip(names, columns)))
+    columns: dict[str, ndarray] = {}
+    for name, values in _fields(shape, strains).items():
+        columns |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": values[:, i] for i, axis in enumerate("xyz")}
+        columns |= dict(zip("xyz", shape.centreline.T)) if name == "s" else {}
+    return _csv(columns)
 
 
 def _csv(columns: dict[str, ndarray]) -> bytes:
@@ -223,11 +232,12 @@ def _csv(columns: dict[str, ndarray]) -> bytes:
 
 
 def _mesh(branch: StoredBranch, shape: Shape, length: float, options):
-    from branches.draw import solid
+    from branches.draw.solid import thickest, widest
     from branches.draw.strip import ROOM, WIDTH
+    from branches.draw.structure import meshed, parts_of
     from branches.scene.fields import ConfigError
 
-    width, most = options.width, solid.widest(shape)
+    width, most = options.width, min(map(widest, parts_of(shape)))
     if width is None:
         width = branch.width_at(length, options.thickness)
         whose = "the scene's" if width is not None else "the default"
@@ -237,14 +247,12 @@ def _mesh(branch: StoredBranch, shape: Shape, length: float, options):
         raise ConfigError(f"--width {width:g}: must not exceed the length, {length:g}")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
-    if options.thickness is None:
-        return solid.surface(shape, width)
-    most = min(solid.thickest(shape, width), width)
-    if options.thickness >= most:
+    most = min(width, *(thickest(part, width) for part in parts_of(shape)))
+    if options.thickness is not None and options.thickness >= most:
         raise ConfigError(
             f"--thickness {options.thickness:g}: must be below {most:.6g}, the width or twice the smallest radius of curvature"
         )
-    return solid.solid(shape, width, options.thickness)
+    return meshed(shape, width, options.thickness)
 
 
 if __name__ == "__main__":

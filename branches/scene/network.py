@@ -272,6 +272,11 @@ class NetworkScene(StagedScene):
                 moments.append((name, action.moment))
         return Load(forces, moments)
 
+    @functools.cached_property
+    def longest(self) -> float:
+        """The length of the longest strip."""
+        return max(member.length for member in self._drawn(self._sections()).values())
+
     @property
     def law_name(self) -> str:
         return next(iter(self.strip().sections.values())).law.name

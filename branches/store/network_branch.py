@@ -1,39 +1,52 @@
-"""A result file of a network in memory: the strips at its points."""
+"""A result file of a network in memory: the strips at its points, with their joints and supports."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from branches.draw.shapes import flat_across
 from branches.draw.strip import View
-from branches.store.files import StoreError
+from branches.draw.structure import BALL, BLOCK, PIN, Fixture, Structure
 from branches.store.open_branch import OpenBranch
-from ribbon_model.shape import Structure
+from ribbon_model.ends import CLAMPED, HINGED, unit
+from ribbon_model.equilibrium import directors
+from ribbon_model.network import HINGE, RIGID, START, Joint, JointEnd, Network
 
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
-_VIEW = View(-62.0, 25.0)
+_VIEW = View(-70.0, 20.0)
+#: Two tangents whose product differs from 1 by less are one direction: a strip that goes on there has no corner.
+_STRAIGHT = 1e-9
 
 
 class NetworkBranch(OpenBranch):
-    """The result file of a network; as `branches.read.StoredBranch`, with lengths in the unit of the scene."""
+    """The result file of a network; as `branches.read.StoredBranch`, with lengths in the unit of the scene.
 
-    def shape(self, point: int) -> Structure:
-        """Return the strips at a kept point, in the order of the network's members, on the axes of the drawing."""
-        t, states = self.states_at(point)
+    Strains and tables have the strips one after the other, in the order of the network's members.
+    """
+
+    def shape_at(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Structure, np.ndarray]:
+        """Return the strips, on the axes of the drawing, and their strains (strips K, 3), of states (K, n) at places t (K,)."""
         network, values = self._strip(point), np.array([*self._numbers(point).values()])
         laws = [network.sections[member.section].form for member in network.members.values()]
-        return Structure(tuple(map(flat_across, network.shapes_at(t, states, values).values(), laws)))
-
-    def strains(self, point: int) -> np.ndarray:
-        """Networks have strains for each strip; raise StoreError."""
-        raise StoreError("strains are of one strip, and this result is of a network (shape(point).parts are its strips)")
+        shapes = tuple(map(flat_across, network.shapes_at(t, states, values).values(), laws))
+        strains = np.concatenate([*network.strains_at(t, states, values).values()])
+        return Structure(shapes, tuple(fixtures(network))), strains
 
     def placed(self, point: int, length: float, cells: int = 0):
-        """Networks are not scaled to a length; raise StoreError."""
-        raise StoreError("meshes and tables of states are of one strip, and this result is of a network; --movie shows it")
+        """Return the strips scaled so that the longest one has this length, and their strains, with so many cells in all."""
+        return super().placed(point, length, -(-cells // len(self._strip(point).members)))
 
     def width_at(self, length: float, thickness: float | None) -> float | None:
         return None
+
+    @property
+    def length(self) -> float:
+        """The length of the longest strip."""
+        return self.scene.longest
+
+    shape_length = length
 
     length_unit = ""
 
@@ -45,3 +58,43 @@ class NetworkBranch(OpenBranch):
     @property
     def view(self) -> View:
         return _VIEW
+
+
+# --- joints and supports ------------------------------------------------------------------------------------------------
+
+
+def fixtures(network: Network) -> Iterator[Fixture]:
+    """Yield what is drawn of the joints of a network: supports, and joints but where a strip just goes on."""
+    for name, joint in network.joints.items():
+        held = network.held.get(name)
+        if held is not None and (held.held or held.rotation == CLAMPED):
+            form = {CLAMPED: BLOCK, HINGED: PIN}.get(held.rotation, BALL)
+            yield _fixture(network, joint.members[0], form, held.axis if form == PIN else None, True)
+        if joint.kind != RIGID or not (held is not None or _goes_on(network, joint)):
+            # the axis of a hinge is the same on all of its ends, but on those that are turned about another axis
+            first = min(joint.members, key=lambda each: each.angle != 0)
+            form = {RIGID: BLOCK, HINGE: PIN}.get(joint.kind, BALL)
+            yield _fixture(network, first, form, joint.axis if form == PIN else None, False)
+
+
+def _fixture(network: Network, each: JointEnd, form: str, axis, held: bool) -> Fixture:
+    """Return a fixture at an end; ``axis`` is on the axes of the drawing, by default that along the width."""
+    own = (1.0, 0.0, 0.0) if axis is None else unit("axis", _frame(network, each) @ np.array(axis))
+    return Fixture(list(network.members).index(each.member), each.end != START, each.arm, own, form, held)
+
+
+def _frame(network: Network, each: JointEnd) -> np.ndarray:
+    """Return the directors (rows) of an end as it is drawn."""
+    member = network.members[each.member]
+    state = member.drawn([0.0 if each.end == START else member.length])[0]
+    return np.array(directors(*state[:4])).reshape(3, 3)
+
+
+def _goes_on(network: Network, joint: Joint) -> bool:
+    """Return whether there is one end only, or two of one strip that goes on, with its section and without a corner."""
+    if len(joint.members) != 2:
+        return len(joint.members) == 1
+    if any(each.angle != 0 or any(each.arm) for each in joint.members):
+        return False
+    one, other = (_frame(network, each)[2] * (1 if each.end == START else -1) for each in joint.members)
+    return len({network.members[each.member].section for each in joint.members}) == 1 and -one @ other > 1 - _STRAIGHT

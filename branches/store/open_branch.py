@@ -11,6 +11,7 @@ import numpy as np
 from branches.draw.shapes import flat_across, moved, standing
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, SIDE, View
+from branches.draw.structure import parts_of
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
@@ -19,7 +20,7 @@ from ribbon_model.changed_ends import fitted
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
-from ribbon_model.shape import Shape, interpolated, parts_of, shape_of
+from ribbon_model.shape import Shape, interpolated, shape_of
 
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
@@ -32,13 +33,7 @@ class OpenBranch(StoredBranch):
 
     def strains(self, point: int) -> np.ndarray:
         """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
-        return self._strains(point, *self.states_at(point))
-
-    def _strains(self, point: int, t: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Return the same for states (K, n) at places t (K,)."""
-        problem = self._strip(point).problem
-        values = [*self._numbers(point).values()]
-        return strains_of(states[:, :4], problem.batch("field").values(t, states, states[:0], np.array(values)))
+        return self.shape_at(point, *self.states_at(point))[1]
 
     def _strip(self, point: int) -> OpenStrip:
         """Return the strip of the stage of a point."""
@@ -64,8 +59,9 @@ class OpenBranch(StoredBranch):
 
     def shape_at(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
         """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
-        material, numbers = self._strip(point).section, SimpleNamespace(**self._numbers(point))
-        strains = self._strains(point, t, states)
+        strip, values = self._strip(point), self._numbers(point)
+        rates = strip.problem.batch("field").values(t, states, states[:0], np.array([*values.values()]))
+        strains, material, numbers = strains_of(states[:, :4], rates), strip.section, SimpleNamespace(**values)
         shape = flat_across(shape_of(t, states, strains), material.form)
         along = {
             field: np.array([float(material.datum(name)(s, numbers)) for s in t])
@@ -87,11 +83,8 @@ class OpenBranch(StoredBranch):
         parts = np.arange(pieces := max(1, -(-cells // (len(nodes) - 1)))) / pieces
         t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
         shape, strains = self.shape_at(point, t, interpolated(*self.states_at(point), self.degree(point), t))
-        shape = standing(shape, self.up)
-        middle = shape.centreline.mean(axis=0)
-        return replace(
-            shape, arclength=shape.arclength * length, centreline=(shape.centreline - middle) * length
-        ), strains / length
+        shape, scale = standing(shape, self.up), length / self.shape_length
+        return moved(shape, np.eye(3), -shape.centreline.mean(axis=0), scale), strains / scale
 
     @property
     def length(self) -> float:
@@ -127,10 +120,14 @@ class OpenBranch(StoredBranch):
 
     def posed(self, points: list[int]) -> dict[int, Shape]:
         """As `StoredBranch.posed`: the direction `up` is up, and the first end, which does not move, is in one place in all."""
-        found = {point: standing(self.shape(point), self.up) for point in points}
-        all_points = np.concatenate([shape.centreline for shape in found.values()] or [np.zeros((1, 3))])
+        return dict(zip(points, self.stood([self.shape(point) for point in points])))
+
+    def stood(self, shapes: list[Shape]) -> list[Shape]:
+        """Return shapes with the direction `up` upwards, all moved alike: the middle of the box around them is the origin."""
+        found = [standing(shape, self.up) for shape in shapes]
+        all_points = np.concatenate([shape.centreline for shape in found] or [np.zeros((1, 3))])
         middle = (all_points.max(axis=0) + all_points.min(axis=0)) / 2
-        return {point: moved(shape, np.eye(3), -middle) for point, shape in found.items()}
+        return [moved(shape, np.eye(3), -middle) for shape in found]
 
     @property
     def view(self) -> View:
@@ -143,7 +140,7 @@ class OpenBranch(StoredBranch):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         parts = [part for strip in strips for part in parts_of(strip)]
         if asked is None:
-            asked = self.width_at(1.0, None) or _WIDTH * max(part.arclength[-1] for part in parts)
+            asked = self.width_at(1.0, None) or _WIDTH * self.shape_length
         return min([asked, *(ROOM * widest(part) for part in parts)])
 
     # --- places ---------------------------------------------------------------------------------------------------------

@@ -265,6 +265,10 @@ def test_bad_input_is_one_sentence(what, results, tmp_path, capsys):
 
 # --- what the page does -------------------------------------------------------------------------------------------
 
+WITHOUT_WEBGL = """const ask = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+        return kind.startsWith("webgl") ? null : ask.call(this, kind, ...more);
+    };"""
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the PATH (Debian: apt-get install chromium)")
 
 
@@ -337,11 +341,7 @@ def test_words_can_be_read(theme, pages, browser):
 
 @needs_chromium
 def test_page_draws_without_webgl(pages, browser):
-    source = """const ask = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
-            return kind.startsWith("webgl") ? null : ask.call(this, kind, ...more);
-        };"""
-    blind = browser.call("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"]
+    blind = browser.call("Page.addScriptToEvaluateOnNewDocument", source=WITHOUT_WEBGL)["identifier"]
     try:
         browser.open(pages / "m1_n2.html")
     finally:
@@ -574,8 +574,43 @@ def test_shapes_of_open_strips_are_those_of_their_polynomials(tmp_path):
     run_scene(scene, tmp_path / "arc.h5", Display(silent=True))
     (family,) = gather([str(tmp_path / "arc.h5")])["families"]
     places, s = decoded(family["branches"][0])[-1, :, -3:], np.linspace(0, 1, 97)
-    arc = 2 * np.pi * np.column_stack([0 * s, np.cos(3 * s) - 1, np.sin(3 * s)]) / 3  # bends about the width
-    assert np.abs(np.abs(places) - np.abs(arc)).max() < 2 * TOLERANCE * np.abs(arc).max()
+    arc = 2 * np.pi * np.column_stack([np.sin(3 * s), 0 * s, np.cos(3 * s) - 1]) / 3  # bends about the width, in a plane y
+    assert np.abs(np.abs(places - places[0]) - np.abs(arc)).max() < 2 * TOLERANCE * np.abs(arc).max()
+
+
+@needs_chromium
+def test_page_of_a_network(tmp_path, root, browser):
+    """Its strips and joints are drawn, its axes chosen, its stages played; a link to a state opens; also without WebGL."""
+    path, page = tmp_path / "frame.h5", tmp_path / "frame.html"
+    run_scene(load(root / "configs" / "network_portal.yaml"), path, Display(silent=True))
+    assert main([str(path), "--out", str(page)]) == 0
+    branch = read_branch(path)
+    browser.open(page, address="#branch=frame_2&point=15&y=C_z")
+    row = branch.points[branch.stage_of == 2][15]
+    assert browser.js("[explore.now.branch.id, explore.now.s, explore.now.x, explore.now.y]") == ["frame_2", 15, "P", "C_z"]
+    value = float(browser.js("document.querySelector('[data-value=C_z]').textContent").replace("\u2212", "-"))
+    assert value == pytest.approx(row["C_z"], abs=1e-8)
+    assert "index 1" in browser.js("document.getElementById('readout').textContent")
+    assert browser.js("document.getElementById('ribbon').data.map(({type}) => type)") == ["mesh3d", "mesh3d"]  # strips, joints
+    meshes = browser.js("document.getElementById('ribbon').data.map(({x, i}) => [x.length, i.length])")
+    assert meshes == [[4 * 3 * 2 * 97, 4 * 3 * 2 * 97], [4 * 4 * 3 * 4, 2 * 4 * 3 * 4]]  # blocks of three rings of four sides
+    tips = "[...document.getElementById('diagram').data.flatMap(({text}) => text || [])]"
+    assert {"BP 1", "BP 2", "<b>1</b>", "<b>2</b>"} <= {text.strip("\u2002") for text in browser.js(tips)}
+    assert browser.colours("#ribbon") > 200
+    browser.key("Home")
+    assert browser.js("explore.now.s") == 0
+    browser.js("document.getElementById('triads').click()")
+    browser.until("document.getElementById('ribbon').data.length === 5")
+    assert browser.errors == []
+    browser.open(page, width=380, height=800)
+    assert browser.js("document.documentElement.scrollWidth") <= 380
+    blind = browser.call("Page.addScriptToEvaluateOnNewDocument", source=WITHOUT_WEBGL)["identifier"]
+    try:
+        browser.open(page)
+    finally:
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=blind)
+    assert browser.colours("#ribbon") > 100
+    assert browser.errors == []
 
 
 @needs_chromium

@@ -2,17 +2,20 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_explore import decoded
 
+from branches.draw.strip import reach_of, rendered
 from branches.explore.gather import gather
+from branches.export.__main__ import main as export
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
-from branches.store.files import StoreError
 
 ROD = "{law: rod, B1: 1.0, B2: 1.0, C: 0.75}"
 #: A cantilever in two pieces, with a load at its tip.
@@ -124,10 +127,11 @@ def test_what_a_file_holds(run, tmp_path):
     assert branch.columns.all["F_A_z"].words == "force on the network at A, along z"
     assert _events(branch, "BP", "P")[0][0] == pytest.approx((math.pi / 2) ** 2, abs=1e-10)  # Euler's column, double
     branch.plot(shapes=2).savefig(tmp_path / "picture.png")
-    with pytest.raises(StoreError, match="of a network"):
-        branch.strains(0)
-    with pytest.raises(StoreError, match="of a network"):
-        branch.placed(0, 1.0)
+    nodes = len(shape.parts[0].arclength)
+    assert branch.strains(0) == pytest.approx(np.zeros((2 * nodes, 3)), abs=1e-12)
+    placed, _ = branch.placed(0, 12.0, 100)  # the longest strip has 0.6 of the length
+    assert [part.arclength[-1] for part in placed.parts] == pytest.approx([8.0, 12.0])
+    assert sum(len(part.arclength) - 1 for part in placed.parts) >= 100
 
 
 def test_a_run_that_is_interrupted_goes_on(root, tmp_path, monkeypatch):
@@ -204,7 +208,98 @@ def test_a_mistake_is_one_sentence(change):
     assert "\n" not in str(raised.value)
 
 
-def test_pages_do_not_show_networks(run, tmp_path):
-    run(CANTILEVER)
-    with pytest.raises(StoreError, match=r"is of a network, which pages do not show; .* draws it"):
-        gather([str(tmp_path / "result.h5")])
+# --- joints, as pictures show them --------------------------------------------------------------------------------------
+
+#: Two strips that are joined by a hinge of a strut, whose middle ends are turned, held in three ways.
+JOINED = f"""
+material: {ROD}
+strips:
+  a: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}
+  b: {{begin: [0, 0, 1], end: [0, 1, 1], normal: [0, 0, 1]}}
+  c: {{begin: [0, 1, 1], end: [0, 2, 2], normal: [1, 0, 0]}}
+joints:
+  A: [a start]
+  corner: [a finish, b start]
+  pin: {{strips: [b finish, c start], hinge: [1, 0, 0]}}
+  end: [c finish]
+held:
+  A: clamped
+  end: {{rotation: free, place: held}}
+loads:
+  P: {{b at 0.5: [0, 0, -1]}}
+stages:
+  - {{follow: P, to: 1.0}}
+"""
+
+
+def test_joints_are_fixed_on_strips(run):
+    """Supports and joints are where the columns say; the place of a load, where the strip goes on, is none."""
+    branch = run(JOINED)
+    last = len(branch.points) - 1
+    shape = branch.shape(last)
+    assert [(one.form, one.held) for one in shape.fixtures] == [
+        ("block", True), ("block", False), ("pin", False), ("ball", True),
+    ]  # fmt: skip
+    for name, (one, solid) in zip(("A", "corner", "pin", "end"), shape.solids(0.1)):
+        place = [branch.points[last][f"{name}_{axis}"] for axis in "xyz"]
+        sides, profile = one.turned
+        middle = (solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2
+        assert middle == pytest.approx(place, abs=0.01)  # a part of the width: 24 sides of a turned pin are not symmetric
+        x, y, z = solid.vertices[solid.triangles].transpose(1, 0, 2)
+        area = sides / 2 * math.sin(2 * math.pi / sides)  # of a polygon in the unit circle
+        (h, r) = 0.1 * profile.T
+        cones = area * np.diff(h) * (r[1:] ** 2 + r[1:] * r[:-1] + r[:-1] ** 2) / 3
+        assert np.linalg.det(np.stack([x, y, z], axis=1)).sum() / 6 == pytest.approx(cones.sum(), rel=1e-12)  # closed, outwards
+    pin = shape.fixtures[2]
+    state = shape.parts[pin.part]
+    axis = np.array(pin.axis) @ state.directors[-1 if pin.last else 0]
+    assert abs(axis @ [1, 0, 0]) == pytest.approx(1, abs=1e-9)  # the plane of the drawing is that of the state
+
+
+def test_a_picture_shows_joints(run):
+    """Blocks and supports have their own colours, in front of the strips."""
+    branch = run("network_portal")
+    shape = branch.posed([0])[0]
+    without = replace(shape, fixtures=())
+    one, other = (rendered(each, 0.06, reach_of([shape], 0.06, branch.view), 300, branch.view) for each in (shape, without))
+    changed = np.abs(one - other).max(axis=-1) > 0.05
+    assert 100 < np.count_nonzero(changed) < 0.05 * changed.size
+    blue = one[changed & (one[..., 3] > 0.99)][:, :3]
+    assert np.mean(blue[:, 2] > blue[:, 0]) > 0.9  # steel, where strips are orange or violet
+
+
+def test_meshes_of_networks(run, tmp_path):
+    """A closed solid for each strip and joint; the volume of strips is length times width times thickness."""
+    trimesh = pytest.importorskip("trimesh")
+    run("network_portal")
+    path, out = tmp_path / "result.h5", tmp_path / "frame.stl"
+    words = ["--point", "7", "--out", str(out), "--out", str(tmp_path / "frame.csv"), "--length", "0.2", "--width", "0.01"]
+    assert export([str(path), *words, "--thickness", "0.002"]) == 0
+    pieces = trimesh.load(out).split()
+    volumes = sorted((piece.volume for piece in pieces), reverse=True)
+    assert len(pieces) == 3 + 2 + 2
+    assert all(piece.is_watertight for piece in pieces)
+    assert volumes[:3] == pytest.approx([0.2 * 0.01 * 0.002] * 3, rel=1e-4)
+    table = np.genfromtxt(tmp_path / "frame.csv", delimiter=",", names=True)
+    assert sorted(set(table["strip"])) == [1, 2, 3]
+    assert table["s"].max() == pytest.approx(0.2)
+
+
+def test_the_page_of_a_network(run, tmp_path):
+    """All stages, the strips side by side, and joints; the states are those of the file."""
+    branch = run("network_portal")
+    page = gather([str(tmp_path / "result.h5")])
+    (family,) = page["families"]
+    first, second = family["branches"]
+    assert (first["name"], second["name"]) == ("stage 1: P", "stage 2: P")
+    assert page["shown"] == ["P", "B_y"]
+    assert [mark["tag"] for mark in first["marks"][1:-1]] == ["BP 1", "BP 2"]
+    assert [len(one["fixtures"]) for one in (first, second)] == [4, 4]
+    assert first["shapes"]["channels"] == 3 * 8
+    shown = branch.posed([len(branch.points) - 1])[len(branch.points) - 1]
+    places = decoded(second)[-1].reshape(-1, 3, 8)[..., -3:]
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1).sum(axis=0)
+    assert lengths == pytest.approx([2 * np.pi] * 3, rel=1e-3)  # of chords
+    for strip, part in zip(places.transpose(1, 0, 2), shown.parts):  # moved by one vector for all points of the page
+        ends = 2 * np.pi * (part.centreline[-1] - part.centreline[0])
+        assert strip[-1] - strip[0] == pytest.approx(ends, abs=1e-3)

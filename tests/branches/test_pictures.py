@@ -57,7 +57,7 @@ def test_stable_is_solid_and_unstable_is_dashed(tmp_path):
     assert stable.get_linestyle() == "-" and unstable.get_linestyle() == "--"
     assert stable.get_ydata()[-1] == pytest.approx(unstable.get_ydata()[0], abs=0.05)  # both reach the fold
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert words == ["stable", "unstable", "bifurcation of a circle", "fold"]
+    assert words == ["stable", "unstable, with the index", "bifurcation of a circle", "fold"]
     assert same_color(stable.get_color(), colour_of(2))
 
 
@@ -190,7 +190,7 @@ def test_texts_hide_no_marks_and_no_other_texts(root, tmp_path):
     picture.draw_without_rendering()
     axes = picture.subfigs[1].axes[1]
     boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
-    assert len(boxes) == 7  # five letters, two folds
+    assert len(boxes) == 10  # five letters, two folds, the index of three unstable pieces
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
     frame = axes.get_window_extent()
     assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in boxes)

@@ -1,0 +1,131 @@
+"""Several strips in space with their joints and supports: blocks where nothing turns, pins of hinges, balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from branches.draw.solid import Mesh, solid, surface, together
+from contin.lowlevel import shown
+from ribbon_model.ends import Vector, perpendicular
+from ribbon_model.shape import Shape
+
+#: Forms of joints.
+BLOCK, PIN, BALL = "block", "pin", "ball"
+#: Number of sides, and profile: (height along the axis, radius), over the width of the strips. A block covers the corners of
+#: strips that meet, a pin is a little longer than a strip is wide.
+_FORMS: dict[str, tuple[int, list[tuple[float, float]]]] = {
+    BLOCK: (4, [(-0.56, 0.26), (0.56, 0.26)]),
+    PIN: (24, [(-0.68, 0.2), (0.68, 0.2)]),
+    BALL: (24, [(-0.36 * np.cos(x), 0.36 * np.sin(x)) for x in np.linspace(0, np.pi, 14)[1:-1].tolist()]),
+}
+#: Supports are larger than joints by this factor, so that a joint at a support is seen.
+_SUPPORT = 1.5
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A joint or a support, fixed on an end of a strip.
+
+    Attributes
+    ----------
+    part : int
+        Number of the strip.
+    last : bool
+        At its last end.
+    arm, axis : tuple of float
+        From there, and of a pin or a block, on the directors of the end.
+    form : str
+        'block', 'pin' or 'ball'.
+    held : bool
+        Whether it is a support.
+    """
+
+    part: int
+    last: bool
+    arm: Vector
+    axis: Vector
+    form: str
+    held: bool
+
+    @property
+    def turned(self) -> tuple[int, np.ndarray]:
+        """The number of sides, and the profile from one end of the axis to the other: (height, radius), over the width."""
+        sides, profile = _FORMS[self.form]
+        rings = np.array([(profile[0][0], 0.0), *profile, (profile[-1][0], 0.0)])
+        return sides, rings * (_SUPPORT if self.held else 1.0)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """The axis and two directions across it, on the directors of the end: rows (3, 3)."""
+        return np.array([self.axis, *perpendicular(self.axis)])
+
+    def solid(self, parts: tuple[Shape, ...], width: float) -> Mesh:
+        """Return it as a closed solid at strips that are drawn with a width: its profile around the axis, flat at both ends."""
+        (sides, rings), shape = self.turned, parts[self.part]
+        row = -1 if self.last else 0
+        place = shape.centreline[row] + np.array(self.arm) @ shape.directors[row]
+        ahead, *across = self.axes @ shape.directors[row]
+        angles = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+        around = np.column_stack([np.cos(angles), np.sin(angles)]) @ np.array(across)
+        points = place + width * (rings[:, :1, None] * ahead + rings[:, 1:, None] * around)
+        numbers = np.arange(len(rings) * sides).reshape(-1, sides)
+        numbers[[0, -1]] = numbers[[0, -1], :1]  # the rings at both ends are points
+        beside = np.roll(numbers, -1, axis=1)
+        quads = np.stack([numbers[:-1], beside[:-1], beside[1:], numbers[1:]], axis=-1).reshape(-1, 4)
+        station = len(shape.arclength) - 1 if self.last else 0
+        return Mesh(points.reshape(-1, 3), quads, np.full(len(rings) * sides, station))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Several strips in space.
+
+    Attributes
+    ----------
+    parts : tuple of Shape
+    fixtures : tuple of Fixture
+        Their joints and supports.
+    """
+
+    parts: tuple[Shape, ...]
+    fixtures: tuple[Fixture, ...] = ()
+
+    __repr__ = shown
+
+    @property
+    def centreline(self) -> np.ndarray:
+        """All centrelines, one after the other, shape (K, 3)."""
+        return np.concatenate([part.centreline for part in self.parts])
+
+    def solids(self, width: float) -> list[tuple[Fixture, Mesh]]:
+        """Return the joints and supports, each with its solid."""
+        return [(one, one.solid(self.parts, width)) for one in self.fixtures]
+
+
+def meshed(shape: Shape | Structure, width: float, thickness: float | None) -> Mesh:
+    """Return the middle surfaces of strips as a mesh or, with a thickness, closed solids, with those of their joints.
+
+    Solids that meet overlap: programs that slice them for a printer take them as one body.
+    """
+    parts = parts_of(shape)
+    if thickness is None:
+        found = [surface(part, width) for part in parts]
+    else:
+        found = [solid(part, width, thickness) for part in parts]
+    first = np.cumsum([0, *(len(part.arclength) for part in parts)])  # node of each strip among all
+    found = [replace(mesh, stations=mesh.stations + start) for mesh, start in zip(found, first)]
+    for one, mesh in solids_of(shape, width) if thickness is not None else []:
+        found.append(replace(mesh, stations=mesh.stations + first[one.part]))
+    return together(found)
+
+
+def parts_of(shape: Shape | Structure) -> tuple[Shape, ...]:
+    """Return the strips of a structure, or the strip."""
+    return shape.parts if isinstance(shape, Structure) else (shape,)
+
+
+def solids_of(shape: Shape | Structure, width: float) -> list[tuple[Fixture, Mesh]]:
+    """Return the joints and supports of a structure with their solids; a strip alone has none."""
+    return shape.solids(width) if isinstance(shape, Structure) else []
