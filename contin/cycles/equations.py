@@ -466,11 +466,23 @@ class CycleEquations(Conditioned, PeriodicEquations):
         return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
 
     def amplitude(self, x: Array) -> float:
-        """Return the size of an orbit as a part of that of the reference; negative where the orbit is half a period later.
+        """Return the size of an orbit: the root mean square without its mean, as far as it lies along the reference.
 
-        It is the product of both, without their means, over that of the reference with itself.
+        It is negative where the orbit is half a period later.
         """
         return float(self.amplitude_row @ x[: self.state_size])
+
+    @property
+    def reference_size(self) -> float:
+        """The `amplitude` of the reference."""
+        weights, varying = self._varying
+        return float(np.sqrt(weights @ np.sum(varying**2, axis=1)))
+
+    @property
+    def _varying(self) -> tuple[Array, Array]:
+        """The weights of the nodes, and the reference without its mean."""
+        weights = self.weights[: self.state_size : self._n]
+        return weights, self.reference - self._mean_turn @ (weights @ self.reference)
 
     @functools.cached_property
     def _mean_turn(self) -> Array:
@@ -482,10 +494,8 @@ class CycleEquations(Conditioned, PeriodicEquations):
     def amplitude_row(self) -> Array:
         """The row that takes the states in x to `amplitude`, shape (state_size,)."""
         if self._amplitude is None:
-            weights = self.weights[: self.state_size : self._n]
-            group = self._mean_turn
-            reference = self.reference - group @ (weights @ self.reference)
-            row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
+            weights, varying = self._varying
+            row = weights[:, None] * (varying - (weights @ varying) @ self._mean_turn) / self.reference_size
             self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 

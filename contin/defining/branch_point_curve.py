@@ -16,7 +16,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.defining.system import Defining
-from contin.events.bordered import BorderedMatrix, bordered_at
+from contin.events.bordered import BorderedMatrix, borders_at
 
 
 class BranchPointCurve(Defining):
@@ -33,9 +33,15 @@ class BranchPointCurve(Defining):
 
     def computed(self, x: Array) -> BorderedMatrix:
         """Return the bordered matrix, with the second parameter held."""
-        found = bordered_at(*self.base.with_free(self.base.free[:-1], self.inside(x)), self.borders)
-        self.borders = found.borders
-        return found
+        system, inside = self.base.with_free(self.base.free[:-1], self.inside(x))
+        if self.borders is None:
+            self.borders = borders_at(system, inside)
+        return BorderedMatrix(system, inside, *self.borders)
+
+    def borders_fit(self, x: Array) -> bool:
+        """Return whether the kernel and its multipliers have not turned away from the borders."""
+        found: BorderedMatrix = self.at(x)
+        return found.fits
 
     def own_values(self, x: Array) -> Array:
         """Return g."""

@@ -28,7 +28,7 @@ from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.arc import SpecialPoint
-from contin.events.extrema import fits, orthonormal
+from contin.linalg.border import orthonormal, rows_fit
 
 
 class _Solutions(NamedTuple):
@@ -68,7 +68,7 @@ class EventCurve(Defining):
         """Return the solutions of F = 0 around x; rows Phi are those that are kept, as long as they fit."""
         rows = np.random.default_rng(11).standard_normal((self.size - self.base.equations, self.size))
         found = self._solved(x, rows if self.borders is None else self.borders)
-        if self.borders is None or not fits(found.tangents, self.weights):
+        if self.borders is None or not rows_fit(found.tangents, self.weights):
             self.borders = orthonormal(found.tangents, self.weights) * self.weights
             found = self._solved(x, self.borders)
         return found

@@ -36,12 +36,16 @@ class ExtremumCurve(Defining):
         return ExtremumCurve(base, self.objective)
 
     def computed(self, x: Array) -> Stationarity:
-        """Return the derivatives of G; the rows Phi are those that are kept, as long as they fit."""
-        found = Stationarity(self.base, x, self.objective, [self.base.size - 1], self.borders)
-        if not found.fits:
-            self.borders = found.orthonormal() * self.base.weights
-            found = Stationarity(self.base, x, self.objective, [self.base.size - 1], self.borders)
-        return found
+        """Return the derivatives of G."""
+        held = [self.base.size - 1]
+        if self.borders is None:
+            self.borders = Stationarity(self.base, x, self.objective, held).orthonormal() * self.base.weights
+        return Stationarity(self.base, x, self.objective, held, self.borders)
+
+    def borders_fit(self, x: Array) -> bool:
+        """Return whether the tangents have not turned away from the rows Phi."""
+        found: Stationarity = self.at(x)
+        return found.fits
 
     def own_values(self, x: Array) -> Array:
         """Return g."""

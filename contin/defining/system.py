@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -34,9 +34,9 @@ from contin.linalg.factors import Factors
 from contin.problems.statement import Statement, multipliers_of, phases_of
 from contin.problems.vector_field import found_elsewhere
 
-#: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
-#: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
-_SHRUNK = 0.1
+#: A curve of cycles ends where they are smaller than this part of its largest reference; parameters differ from those of the
+#: equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
+_SHRUNK = 1e-2
 
 T = TypeVar("T")
 
@@ -90,8 +90,10 @@ class Defining(Discretization):
         self.weights, self.state_size = np.append(base.weights, np.ones(self.own_unknowns)), base.state_size
         self.intervals, self.degree = base.intervals, base.degree
         self.scales, self.free_scales = base.scales, base.free_scales
-        #: What borders the singular matrix: about its null vectors. Made when first needed, renewed where they have turned.
+        #: What borders the singular matrix: about its null vectors. Made when first needed, renewed by `adapted`.
         self.borders: Any = None
+        #: The size of the largest reference of the run, where solutions have one.
+        self.largest = float(cast(Any, base).reference_size) if base.size_of_solutions is not None else 0.0
         self._known: dict[str, tuple[bytes, Any]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -107,6 +109,10 @@ class Defining(Discretization):
     @abstractmethod
     def computed(self, x: Array) -> Any:
         """Return what the own equations are made of."""
+
+    def borders_fit(self, x: Array) -> bool:
+        """Return whether the borders are still close to the null vectors at x."""
+        return True
 
     @abstractmethod
     def own_values(self, x: Array) -> Array:
@@ -173,7 +179,7 @@ class Defining(Discretization):
 
         def amplitude(trial: Trial) -> float:
             system: Any = trial.system
-            return float(system.base.amplitude(system.inside(trial.x))) - _SHRUNK
+            return float(system.base.amplitude(system.inside(trial.x)) - _SHRUNK * system.largest)
 
         name = "the end, near a Hopf point where the cycles have no size"
         return [Event(Label.END, name, amplitude, terminal=True)] if self.base.size_of_solutions is not None else []
@@ -262,14 +268,23 @@ class Defining(Discretization):
         return self._moved(self.base.on_switches(self.inside(x), closely))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Defining, Carrier] | None:
-        """Return the defining system on a better mesh, and the carrier."""
-        return self._moved(self.base.adapted(self.inside(x), control))
+        """Return the defining system on a better mesh, or with new borders where the old ones do not fit, and the carrier."""
+        changed = self.base.adapted(self.inside(x), control)
+        if changed is None and not self.borders_fit(x):
+            changed = self.base, np.array
+        return self._moved(changed)
 
     def _moved(self, changed: tuple[System, Carrier] | None) -> tuple[Defining, Carrier] | None:
         if changed is None:
             return None
-        other = self.on(changed[0])
+        other = self._renewed(changed[0])
         return other, self.carrier(other)
+
+    def _renewed(self, base: System) -> Defining:
+        """Return the defining system of the same run on another mesh, or with another reference."""
+        other = self.on(base)
+        other.largest = max(self.largest, other.largest)
+        return other
 
     # --- what is known of the solutions themselves: the unknowns that the curve adds are their own -----------------------
 
@@ -282,7 +297,7 @@ class Defining(Discretization):
         """Return the same with the solution itself as the reference."""
         size, base = self.base.size, self.base
         found: Any = base.referring_to(x[:size], tangent[:size])
-        return self if found is base else self.on(found)
+        return self if found is base else self._renewed(found)
 
     def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
         """Return the solution itself, and vectors, in phase."""

@@ -14,14 +14,12 @@ coordinates s. The branch point is where the gradient vanishes, and the Hessian 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.protocol import Discretization, inner
+from contin.core.protocol import Discretization
 from contin.errors import ConvergenceError
-from contin.linalg.border import FITS, Bordered, cosine
+from contin.linalg.border import FITS, Bordered, cosine, orthonormal, rows_fit
 from contin.linalg.singular import smallest_directions
 
 #: Smallest singular value of M, relative to the second smallest, below which M counts as singular. At double points of random
@@ -76,6 +74,11 @@ class BorderedMatrix:
         w: Array = self._bordered.left[0]
         return w
 
+    @property
+    def fits(self) -> bool:
+        """Whether the kernel and its multipliers have not turned away from the borders."""
+        return rows_fit(self.kernel, self._system.weights) and not cosine(self.borders[1], self.multipliers()) < FITS
+
     def left(self) -> Array:
         """Return the multipliers with unit length."""
         left = self.multipliers()
@@ -91,33 +94,11 @@ class BorderedMatrix:
         return np.array([[aa, ab], [ab, bb]])
 
 
-def bordered_at(system: Discretization, x: Array, borders: tuple[Array, Array] | None) -> BorderedMatrix:
-    """Return M at x with borders that fit its null vectors: those given, or new ones where these have turned, or are None."""
-    if borders is None:
-        return BorderedMatrix(system, x, *borders_at(system, x))
-    found = BorderedMatrix(system, x, *borders)
-    longest = max(np.sqrt(inner(system, v, v)) for v in found.kernel)  # 1 where the kernel lies along its border
-    if not min(1 / longest, cosine(borders[1], found.multipliers())) < FITS:
-        return found
-    return BorderedMatrix(system, x, orthonormal(system, found.kernel), found.left())
-
-
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
     """Return borders made of null vectors at x: of those that random borders give, or rows about the ``kernel``."""
     random = np.random.default_rng(20240501)
-    phi = orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
+    phi = orthonormal(random.standard_normal((2, system.size)) if kernel is None else kernel, system.weights)
     matrix = BorderedMatrix(system, x, phi, random.standard_normal(system.equations) / np.sqrt(system.equations))
     if not np.isfinite(matrix.kernel).all():
         raise ConvergenceError("no branch point near by: the bordered matrix is singular")
-    return orthonormal(system, matrix.kernel), matrix.left()
-
-
-def orthonormal(system: Discretization, vectors: Iterable[Array]) -> Array:
-    """Return vectors as rows made orthonormal in the weighted inner product: Gram-Schmidt, twice."""
-    result: list[Array] = []
-    for vector in vectors:
-        for _ in range(2):
-            for other in result:
-                vector = vector - inner(system, vector, other) * other
-        result.append(vector / np.sqrt(inner(system, vector, vector)))
-    return np.array(result)
+    return orthonormal(matrix.kernel, system.weights), matrix.left()

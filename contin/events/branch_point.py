@@ -17,8 +17,9 @@ from contin.arrays import Array
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
-from contin.events.bordered import BorderedMatrix, borders_at, orthonormal
+from contin.events.bordered import BorderedMatrix, borders_at
 from contin.events.labelled import Elsewhere, Finding
+from contin.linalg.border import orthonormal
 from contin.linalg.orientation import ordered, oriented, oriented_along
 
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
@@ -293,7 +294,7 @@ class _Search:
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
         tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
         tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]
-        kernel = orthonormal(system, matrix.kernel)
+        kernel = orthonormal(matrix.kernel, system.weights)
         change = np.linalg.inv([[inner(system, old, new) for new in kernel] for old in matrix.kernel])  # new = change @ old
         hessian = change @ hessian @ change.T
         return BranchPoint(self.x, tuple(tangents), kernel, matrix.left(), hessian, float(abs(self.beta)))

@@ -25,7 +25,7 @@ from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
-from contin.linalg.border import FITS
+from contin.linalg.border import orthonormal, rows_fit
 
 
 class Stationarity:
@@ -78,7 +78,7 @@ class Stationarity:
     @property
     def fits(self) -> bool:
         """Whether the tangents have not turned away from the rows Phi."""
-        return fits(self.kernel, self._system.weights)
+        return rows_fit(self.kernel, self._system.weights)
 
     def orthonormal(self) -> Array:
         """Return an orthonormal basis of the tangents, shape (j, size), in the inner product of the system."""
@@ -89,19 +89,6 @@ class Stationarity:
         change = np.linalg.lstsq(self.kernel.T, self.orthonormal().T)[0]
         hessian = change.T @ (self.gradients() @ self.kernel.T) @ change
         return np.asarray(np.linalg.eigvalsh((hessian + hessian.T) / 2), dtype=float)
-
-
-def orthonormal(vectors: Array, weights: Array) -> Array:
-    """Return an orthonormal basis, as rows, of the space of some vectors (k, size), in the weighted inner product."""
-    root = np.sqrt(weights)
-    basis: Array = np.linalg.qr((vectors * root).T)[0].T / root
-    return np.ascontiguousarray(basis)
-
-
-def fits(tangents: Array, weights: Array) -> bool:
-    """Return whether tangents have not turned away from orthonormal rows that have the product 1 with them."""
-    longest = np.sqrt((weights * tangents**2).sum(axis=1).max())  # 1 where each lies along its row
-    return not 1 / longest < FITS
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:

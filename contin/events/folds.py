@@ -22,7 +22,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.branch_points import OUTSIDE
 from contin.events.nearness import DEEPER
-from contin.events.significance import passed_before, senses
+from contin.events.significance import passed_before, sense, senses
 from contin.events.zeros import followed
 from contin.functions.kernel_parts import helper
 
@@ -210,17 +210,21 @@ class FoldSearch:
         return _Parabola(first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean)
 
     def _dip(self, left: Place, right: Place) -> Place | None:
-        """Return a place between two of equal rates where the rate has the other sign; None if there is none."""
+        """Return a place between two of equal rates where the rate has the other sign by more than round-off, or None.
+
+        Where the parameter stands still and goes on, as at a hysteresis point, signs are round-off.
+        """
         parabola = self._parabola(left, right)
         first, last = parabola.first, parabola.last
         if not (first or last):
             return None
-        sense = math.copysign(1.0, first or last)
-        at, square = self._suspect(left, right, parabola if sense > 0 else parabola.times(sense))
+        sign = math.copysign(1.0, first or last)
+        at, square = self._suspect(left, right, parabola if sign > 0 else parabola.times(sign))
         if at is None:
             return None
         flat = _FLAT * max(abs(first), abs(last))
-        return followed(self._place, lambda trial: sense * self.rate(trial), (at, square), (left[0], right[0]), flat)
+        found = followed(self._place, lambda trial: sign * self.rate(trial), (at, square), (left[0], right[0]), flat)
+        return found if found is not None and sense(found[1], self.fold, self.arc.newton) else None
 
     def _place(self, s: float) -> Place:
         return s, self.arc.at(s)

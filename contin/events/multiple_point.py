@@ -25,6 +25,7 @@ from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
+from contin.linalg.border import orthonormal
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
 from contin.linalg.singular import smallest_directions
 
@@ -253,14 +254,7 @@ def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newt
     u, _, vh = np.linalg.svd(response)
     phi = [row / system.weights, *canonical_basis(u[:, :dimension].T @ right, system.weights)]
     psi = canonical_basis((vh[:dimension] @ left)[:, : system.equations])
-    return _Manifold(system, x, _orthonormal(system, np.array(phi)), psi, newton)
-
-
-def _orthonormal(system: Discretization, vectors: Array) -> Array:
-    root = np.sqrt(system.weights)
-    q, _ = np.linalg.qr((vectors * root).T)
-    result: Array = q.T / root
-    return result
+    return _Manifold(system, x, orthonormal(np.array(phi), system.weights), psi, newton)
 
 
 def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> MultiplePoint:
@@ -268,7 +262,7 @@ def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> Mult
     system = manifold.system
     x, _, G = manifold.at(s)
     vectors = manifold.vectors
-    basis = _orthonormal(system, vectors)
+    basis = orthonormal(vectors, system.weights)
     home = row / system.weights
     along = np.array([inner(system, vector, home) for vector in basis])
     ours = along @ basis / np.linalg.norm(along)

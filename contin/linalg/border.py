@@ -5,8 +5,9 @@
                          [  c      0  ]  [ g_i ] = [ e_i ]           and w_i, the same of the transposed matrix.
 
 The numbers g vanish where A v = 0; dg_i = -w.dA v_i. Borders of the null vectors themselves are the best conditioned. Random
-ones come first, then those that their solutions make, which is inverse iteration. Where they follow null vectors that turn,
-the determinant of the bordered matrix keeps its sign, and so do v, w and g.
+ones come first, then those that their solutions make, which is inverse iteration. A run renews them where null vectors have
+turned, at accepted points only: made at an iterate of Newton's method that is far away they may point the other way, and the
+determinant of the equations changes its sign without a branch point.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def null_vectors(
     weights: Array | float = 1.0,
     single: Callable[[Bordered], tuple[Any, Any]] = lambda found: (found.left[0], found.right[0]),
 ) -> tuple[Bordered, Borders]:
-    """Return the bordered matrix with borders that fit its null vectors, and these borders.
+    """Return the bordered matrix and its borders: those that are given, or new ones that fit its null vectors.
 
     Parameters
     ----------
@@ -106,28 +107,57 @@ def null_vectors(
     shape : tuple of int
         Lengths of b and c.
     borders : pair of ndarray, optional
-        Those to begin with; random ones by default.
+        By default, inverse iteration begins with random ones.
     weights : ndarray, shape (unknowns,)
         Of the inner product in which c is a vector.
     single : callable
         Returns the left and the right null vector, which may be complex.
     """
-    if borders is None:
-        random = np.random.default_rng(11)
-        borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
+    if borders is not None:
+        return bordered(*borders), borders
+    random = np.random.default_rng(11)
+    borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
     found, root = bordered(*borders), np.sqrt(weights)
     for _ in range(_ROUNDS):
-        left, right = single(found)
-        if not min(cosine(borders[0], left), cosine(borders[1] / root, right * root)) < FITS:
+        vectors = left, right = single(found)
+        if fit(borders, vectors, weights):
             break
         borders = _largest_part(left), _largest_part(right * root) * root
         found = bordered(*borders)
     return found, borders
 
 
+def fit(borders: Borders, vectors: tuple[Numbers, Numbers], weights: Array | float = 1.0) -> bool:
+    """Return whether the left and the right null vector have not turned away from their borders."""
+    root, (left, right) = np.sqrt(weights), vectors
+    return not min(cosine(borders[0], left), cosine(borders[1] / root, right * root)) < FITS
+
+
+def rows_fit(tangents: Array, weights: Array) -> bool:
+    """Return whether tangents have not turned away from orthonormal rows that have the product 1 with them."""
+    longest = np.sqrt((weights * tangents**2).sum(axis=1).max())  # 1 where each lies along its row
+    return not 1 / longest < FITS
+
+
 def cosine(a: Array, b: Numbers) -> float:
     """Return the absolute cosine between a real vector and a real or complex one."""
     return float(abs(a @ b) / np.sqrt((a @ a) * float(np.vdot(b, b).real)))
+
+
+def orthonormal(vectors: Array, weights: Array | float = 1.0) -> Array:
+    """Return an orthonormal basis of the space of some vectors, in a weighted inner product and with their orientation.
+
+    Determinants of equations that are stated on the basis keep their sign when borders are renewed.
+
+    Parameters
+    ----------
+    vectors : ndarray, shape (k, size)
+    weights : ndarray, shape (size,)
+    """
+    root = np.sqrt(weights)
+    columns, triangle = np.linalg.qr((vectors * root).T)
+    basis: Array = (columns * np.copysign(1.0, np.diag(triangle))).T / root
+    return np.ascontiguousarray(basis)
 
 
 def _largest_part(vector: Numbers) -> Array:

@@ -153,3 +153,20 @@ def test_a_vertical_branch_of_a_discretized_column_has_no_folds(factor):
     assert max(branch.points[-1].x[:count]) > 100
     (note,) = branch.notes
     assert note.startswith("lam stays at 9.86116") and "a vertical family" in note
+
+
+@pytest.mark.parametrize("steps", range(12))
+def test_a_hysteresis_point_is_no_fold(steps):
+    """A stirred tank, p2 = 16, p3 = 3: both folds meet at x = 1/2, y = 2, p1 = exp(-2), where p1 stands still and goes on.
+
+    p1 = x exp(-4 x) / (1 - x) on equilibria, whose derivative (1 - 2 x)^2 exp(-4 x) / (1 - x)^2 has one sign.
+    """
+
+    def tank(u, p):
+        rate = p.p1 * (1 - u.x) * math.exp(u.y)
+        return -u.x + rate, -u.y + p.p2 * rate - p.p3 * u.y
+
+    problem = AlgebraicProblem(tank, ["x", "y"], {"p1": 0.0, "p2": 16.0, "p3": 3.0})
+    step = 0.02 * (1 + 0.185 * steps)
+    branch = trace(solve(problem, [0.0, 0.0]), free=["p1"], limits={"p1": (-1, 0.25)}, step=step, max_step=0.1 * (1 + steps))
+    assert not branch.labelled("LP") and branch[-1]["p1"] == pytest.approx(0.25)

@@ -111,3 +111,29 @@ def test_extrema_of_a_column_without_known_derivatives():
 def test_extrema_of_unknown_columns():
     with pytest.raises(ProblemError, match="'product' is no column of this problem"):
         trace(solve(sphere(), [1.0]), free=["x2"], extrema=["product"])
+
+
+def test_a_curve_of_extrema_follows_cycles_to_a_hopf_point():
+    """Demo ``ops``: extrema of p3 on cycles, whose tangents turn far on the way; no branch point is suspected.
+
+    The curve ends where the cycles have a hundredth of their largest size. Parameters differ by the square of that from those
+    of Hopf points, where c2 c1 = c0 in lambda^3 + c2 lambda^2 + c1 lambda + c0, and the period from 2 pi / sqrt(c1).
+    """
+
+    def ops(u, p):
+        return (-p.p4 * (u.x**3 / 3 - u.x) + (u.z - u.x) / p.p2 - u.y) / p.p1, u.x - p.p3, -(u.z - u.x) / p.p2
+
+    values = {"p1": 0.5, "p2": 4.0, "p3": 0.9, "p4": 2.0}
+    first = solve(AlgebraicProblem(ops, ["x", "y", "z"], values), [0.9, 1.314, 0.9])
+    rest = trace(first, free=["p3"], limits={"p3": (0.8, 0.95)})
+    limits = {"p3": (0.8992, 1), "period": (0, 12)}
+    cycles = trace(rest.labelled("HB")[0], branch=1, free=["p3"], limits=limits, extrema=["p3"])
+    found = curve(cycles.labelled("EX")[0], "p2", direction=-1, limits={"p2": (0.5, 6)})
+    end = found[-1]
+    assert end.label == "EP" and "near a Hopf point" in str(found.stop)
+    assert not [note for note in found.notes if "determinant" in note]
+    p1, p2, p3, p4 = (end[name] for name in values)
+    a = (p4 * (1 - p3**2) - 1 / p2) / p1
+    c2, c1, c0 = 1 / p2 - a, 1 / p1 - a / p2 - 1 / (p1 * p2**2), 1 / (p1 * p2)
+    assert c2 * c1 == pytest.approx(c0, abs=1e-3)
+    assert end["period"] == pytest.approx(2 * math.pi / math.sqrt(c1), abs=1e-3)
