@@ -415,7 +415,9 @@ class Network:
             if key not in densities:
                 densities[key] = self._hamiltonian(member)
             segments.append(VariationalSegment(None, (*FRAME, *CENTRELINE), member.length, hamiltonian=densities[key]))
-        return SegmentedVariationalProblem(segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy)
+        return SegmentedVariationalProblem(
+            segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes
+        )
 
     def _hamiltonian(self, member: Member) -> Callable:
         section, length, name = self.sections[member.section], member.length, member.section
@@ -613,7 +615,7 @@ class Network:
             told = f": {self._reason(first)}" if first else ""
             raise ProblemError(
                 f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
-                f"{way[-1][ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
+                f"{max(point[ASSEMBLY] for point in way):.3g} of the way; draw the network nearer to a state{told}"
             )
         try:
             return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
@@ -645,27 +647,31 @@ class Network:
         text = str(error)
         return MECHANISM if Undetermined.MODE in text else UNDETERMINED if Undetermined.CONDITIONS in text else text
 
-    def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
-        """Return the sizes of states and numbers for `contin.Settings.scales`, at a state; see `OpenStrip.sizes`.
+    @property
+    def _sizes(self) -> dict[str, float]:
+        """Sizes of states and numbers: what is small in a first state, or round-off, is not small by its nature.
 
-        Places have the size of the longest member, forces and moments that of the smallest stiffness or of the largest of them.
+        Places have the size of the longest member, forces and moments that of the smallest stiffness.
         """
-        known = {**self.parameters, **dict(zip((*system.problem.state_names, *system.free), system.largest(x)))}
         stiffness = [
-            known[self._full(name, number)] for name, section in self.sections.items() for number in section.stiffnesses
-        ]
-        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in self.loads or name in POTENTIALS]
-        force = max(min(stiffness, default=1.0), *(abs(known[name]) for name in forces))
-        length = max(member.length for member in self.members.values())
-        lengths = [name for name in system.problem.state_names if name.startswith(CENTRELINE)]
-        moves = [name for name in self._prescribed if name.endswith(MOVES)]
-        turns = [name for name in known if name not in (*forces, *lengths, *moves) and name not in self._of_sections]
-        return dict.fromkeys(turns, 1.0) | dict.fromkeys((*lengths, *moves), length) | dict.fromkeys(forces, force)
+            self.parameters[self._full(name, number)]
+            for name, section in self.sections.items() for number in section.stiffnesses
+        ]  # fmt: skip
+        force, length = min(stiffness, default=1.0), max(member.length for member in self.members.values())
+        own = set(self._of_sections)
+        found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": force}
+        found |= dict.fromkeys([name for name in self._prescribed if name.endswith(MOVES)], length)
+        found |= dict.fromkeys([name for name in (*self.loads, *POTENTIALS) if name in found], force)
+        for number in range(len(self.members)):
+            behind = f"_{number}" if len(self.members) > 1 else ""
+            for names, size in ((FRAME, 1.0), (CENTRELINE, length)):
+                found |= {f"{name}{behind}": size for name in names} | {f"lam_{name}{behind}": force for name in names}
+        return found
 
     @property
-    def _of_sections(self) -> set[str]:
+    def _of_sections(self) -> list[str]:
         """Names of all numbers of the sections."""
-        return {self._full(name, number) for name, section in self.sections.items() for number in section.parameters}
+        return [self._full(name, number) for name, section in self.sections.items() for number in section.parameters]
 
     # --- where laws end -----------------------------------------------------------------------------------------------
 

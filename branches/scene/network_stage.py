@@ -47,6 +47,9 @@ class NetworkStage(OpenStage):
         system = Collocation(self.problem, origin.system.mesh, origin.system.degree, free, values)
         return system, system.pack(origin.system.states(origin.x), values)
 
+    def sizes(self, system: Collocation, x: np.ndarray) -> Mapping[str, float]:
+        return {}  # the problem has its own
+
     def mesh_control(self) -> MeshControl:
         mesh = self.scene.mesh
         return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)

@@ -264,6 +264,10 @@ class OpenStage(Stage):
         settings = dataclasses.replace(self._settings(origin.system, origin.x), direction=way)
         return settings, way * origin.details.tangents[1]
 
+    def sizes(self, system: Collocation, x: np.ndarray) -> Mapping[str, float]:
+        """Return the sizes of states and numbers where the stage starts."""
+        return self.strip.sizes(system, x)
+
     def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
         """Return the settings of a stage that starts at a state."""
         stage, steps = self.stage, self.scene.steps
@@ -277,7 +281,7 @@ class OpenStage(Stage):
             primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
             max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
             zeros=zeros, mesh=self.mesh_control(), newton=newton_of(self.scene), events=self.strip.domain_tests(),
-            scales=self.strip.sizes(system, x),
+            scales=self.sizes(system, x),
         )  # fmt: skip
 
     # --- columns --------------------------------------------------------------------------------------------------------

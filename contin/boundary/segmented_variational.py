@@ -121,6 +121,8 @@ class SegmentedVariationalProblem(VariationalProblem):
         Maps of all states, side by side, that leave the energy unchanged; see `VariationalProblem`.
     phases : sequence of str, optional
         Names of states whose multipliers vanish by symmetry; see `VariationalProblem`.
+    sizes : mapping of str to float, optional
+        Of all states and multipliers, and of parameters; see `VariationalProblem`.
 
     Raises
     ------
@@ -155,6 +157,7 @@ class SegmentedVariationalProblem(VariationalProblem):
     def __init__(
         self, segments: Sequence[VariationalSegment], parameters: Mapping[str, float], *, ends: Function | None = None,
         end_energy: Function | None = None, symmetries: Mapping[str, Symmetry] | None = None, phases: Sequence[str] = (),
+        sizes: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         given = tuple(checks.sequence("segments", segments, "VariationalSegment"))
         if not given:
@@ -181,6 +184,7 @@ class SegmentedVariationalProblem(VariationalProblem):
         self._keep(segments=given, pieces=with_multipliers)
         phases = [f"lam_{name}" for name in checks.chosen("phases", phases, names)]
         self._derive(variation, derived, parameters, symmetries, phases)
+        self._keep(sizes=self._sized(sizes or {}))
 
     def _signatures(self) -> Mapping[str, Any]:
         """Return the arguments of the functions."""

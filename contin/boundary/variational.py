@@ -63,6 +63,9 @@ class VariationalProblem(BoundaryValueProblem):
     domain : pair of float
     starts : mapping of str to float, optional
         Where the search for the controls starts at each point (0): in the domain of the energy.
+    sizes : mapping of str to float, optional
+        Sizes of states, multipliers and parameters whose values may be smaller, or round-off, where a run begins: forces
+        without a load. ``sigma`` stands for all multipliers of end conditions.
 
     Raises
     ------
@@ -103,7 +106,7 @@ class VariationalProblem(BoundaryValueProblem):
         integrals: Mapping[str, Function] | None = None, end_energy: Function | None = None,
         functionals: Mapping[str, Function] | None = None, hamiltonian: Function | None = None,
         symmetries: Mapping[str, Symmetry] | None = None, domain: tuple[float, float] = (0.0, 1.0),
-        starts: Mapping[str, float] | None = None, phases: Sequence[str] = (),
+        starts: Mapping[str, float] | None = None, phases: Sequence[str] = (), sizes: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
         names = check_statement(states, parameters, functionals)
@@ -133,6 +136,7 @@ class VariationalProblem(BoundaryValueProblem):
         )  # fmt: skip
         phases = [f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held]
         self._derive(variation, canonical(variation), parameters, symmetries, phases, domain)
+        self._keep(sizes=self._sized(sizes or {}))
 
     def _derive(
         self, variation: Variation, derived: Canonical, parameters: Mapping[str, float],
@@ -149,6 +153,16 @@ class VariationalProblem(BoundaryValueProblem):
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
             phases=phases,
         )  # fmt: skip
+
+    def _sized(self, sizes: Mapping[str, float]) -> dict[str, float]:
+        """Return the sizes that are given, checked."""
+        found: dict[str, float] = {}
+        for name, size in checks.mapping("sizes", sizes, "positive numbers").items():
+            checks.chosen("sizes", [name], (*self.state_names, *self.parameters, "sigma"))
+            checks.number(f"sizes: {name}", size, 0)
+            of_ends = self.multipliers[len(self.variation.integrals) :]
+            found |= dict.fromkeys(of_ends if name == "sigma" else [name], size)
+        return found
 
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""

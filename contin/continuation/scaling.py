@@ -36,6 +36,7 @@ from contin.core.settings import Settings
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
 from contin.events.significance import on_finer_mesh
+from contin.problems.statement import declared
 
 #: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
 #: times more separate eigenvalues that differ by a tenth.
@@ -88,6 +89,8 @@ def scaled(
     problem, states = system.problem, list(system.problem.states)
     names, stated = [*states, *system.free], settings.scales
     sizes, held = system.largest(x), dict(zip(problem.parameters, np.abs(system.parameters)))
+    values = {**held, **dict(zip(names, sizes))}
+    stated = {name: max(size, values[name]) for name, size in declared(problem, "sizes").items()} | dict(stated)
     if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))

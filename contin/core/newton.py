@@ -240,7 +240,7 @@ def _settled(
     """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
     An unknown that is zero has no size: its updates vanish much faster than they become small. What is left of it is round-off
-    of the iterate before.
+    of the iterate before. An update that is round-off is not made: where the matrix is nearly singular, it leads away.
 
     Raises
     ------
@@ -255,14 +255,14 @@ def _settled(
         relative.append(_relative(update, sizes(x)))
         if not np.isfinite(update).all():
             break
-        least = newton.tolerance * np.maximum(sizes(x), before)
-        if not np.all(np.abs(update) <= least):
-            now = rounded_off(system, x, rows)
-            least, noise = np.maximum(least, UNITS * np.maximum(noise, now)), now
-        small = np.all(np.abs(update) <= least)
-        error, before = subtract(x, update), np.abs(update)
-        if small:
-            return Corrected(x, factors, len(updates) + len(relative), error)
+        least, count = newton.tolerance * np.maximum(sizes(x), before), len(updates) + len(relative)
+        if np.all(np.abs(update) <= least):
+            return Corrected(x, factors, count, subtract(x, update))
+        now = rounded_off(system, x, rows)
+        if np.all(np.abs(update) <= np.maximum(least, UNITS * np.maximum(noise, now))):
+            return Corrected(x, factors, count, float(np.max(np.abs(update) / (1 + np.abs(x)))))
+        noise, before = now, np.abs(update)
+        subtract(x, update)
     raise _failure(relative)
 
 

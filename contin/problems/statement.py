@@ -69,6 +69,8 @@ class Restated:
     angles: Any = {}
     #: Symmetries that are declared, by name.
     symmetries: Mapping[str, Any] = {}
+    #: Sizes of states and parameters whose values are smaller where a run begins, as forces without a load.
+    sizes: Mapping[str, float] = {}
     #: Into how many equal parts a symmetry divides solutions.
     order = 1
     #: The states move in time: solutions are equilibria.

@@ -342,6 +342,8 @@ def stated(**changed):
         ({"energy": None}, "energy: None must be a function"),
         ({"energy": lambda t, x, w, p: w.y**2 - math.log(w.y)}, r"starts: the energy has no value at the controls y = 0"),
         ({"starts": {"z": 1.0}}, "starts: 'z' is not one of the controls"),
+        ({"sizes": {"z": 1.0}}, "sizes: 'z' must be one of"),
+        ({"sizes": {"y": 0.0}}, "sizes: y: 0.0 must be a number between 0 and inf"),
         ({"starts": {"y": math.inf}}, "starts: y: inf must be a finite number"),
         ({"ends": lambda a, b, p: (a.y, a.y)}, "ends: condition 2 repeats or contradicts"),
         ({"ends": lambda a, b, p: (a.y + b.y, a.y + b.y - 1)}, "ends: condition 2 repeats or contradicts"),
