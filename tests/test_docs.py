@@ -1,6 +1,6 @@
 """The code in docs/ runs as written, block after block: Python, and commands of this project.
 
-Left out: commands of other programs (a browser, apt), finite elements, which take many minutes, and what test_strip,
+Left out: commands of other programs (a browser, apt), and what test_strip,
 test_store (file-format.md) and test_other_programs (from-auto.md, from-xppaut.md) run.
 """
 
@@ -78,6 +78,69 @@ def test_the_page_of_finite_elements_runs():
     pytest.importorskip("skfem", reason="scikit-fem is not installed (pip install scikit-fem)")
     scope = python_of("large.md")
     assert 14 < (error_of_the_fold(scope, 8) / error_of_the_fold(scope, 16)) < 18
+    coarse, fine = (np.array(scope["folds"])[:, 0], folds_of_a_cap(scope, 4))
+    series = folds_by_ritz(5, scope["nu"])
+    assert np.abs(fine / series - 1).max() < 0.04 and np.all(np.abs(fine - series) < 0.55 * np.abs(coarse - series))
+
+
+def folds_of_a_cap(scope, refinements):
+    problem, _ = scope["cap"](5, refinements)
+    flat = contin.solve(problem, np.zeros(len(problem.states)))
+    branch = contin.trace(flat, free=["load"], limits={"load": (0, 1)}, max_points=60, errors=False)
+    return np.array([fold["load"] for fold in branch.labelled("LP")])
+
+
+def folds_by_ritz(number, nu, count=10):
+    """Loads at the folds of a clamped shallow cap in axial symmetry, from polynomials in the radius, without finite elements.
+
+    The deflection at the centre is prescribed; the displacement along the radius is eliminated.
+    """
+    root = np.sqrt(3 * (1 - nu**2))
+    rise = number**2 / (4 * root)
+    x, weights = np.polynomial.legendre.leggauss(60)
+    r = (x + 1) / 2
+    weights = weights / 2 * r
+    powers = [np.polynomial.Polynomial.basis(2 * i) for i in range(count)]
+    rim = np.polynomial.Polynomial([1, 0, -1])
+    w = [rim**2 * power for power in powers]
+    u = [rim * power * np.polynomial.Polynomial([0, 1]) for power in powers]
+    slope, bend = (np.array([one.deriv(order)(r) for one in w]) for order in (1, 2))
+    hoop, radial = np.array([one(r) / r for one in u]), np.array([one.deriv()(r) for one in u])
+
+    def form(one, other):
+        mixed = (one * weights) @ other.T
+        return (one * weights) @ one.T + (other * weights) @ other.T + nu * (mixed + mixed.T)
+
+    bending, stretching, along = form(bend, slope / r) / 12, form(radial, hoop), radial + nu * hoop
+    load = 8 * rise**2 * (1 - nu**2) / root * (np.array([one(r) for one in w]) @ weights)
+
+    def balance(a):
+        tilt = a @ slope
+        strain, change = tilt**2 / 2 + 2 * rise * r * tilt, (tilt + 2 * rise * r) * slope
+        b = -np.linalg.solve(stretching, along @ (weights * strain))
+        force = strain + b @ along
+        beside = (along * weights) @ change.T
+        matrix = bending + (slope * weights * force) @ slope.T + (change * weights) @ change.T
+        return bending @ a + change @ (weights * force), matrix - beside.T @ np.linalg.solve(stretching, beside)
+
+    def load_at(centre, a, p):
+        for _ in range(30):
+            values, matrix = balance(a)
+            unit = np.eye(count)[0]
+            system = np.block([[matrix, -load[:, None]], [unit[None], np.zeros((1, 1))]])
+            step = np.linalg.solve(system, -np.append(values - p * load, a[0] - centre))
+            a, p = a + step[:-1], p + step[-1]
+        return a, p
+
+    places, a, p, found = np.arange(0.05, 2.2 * rise, 0.05), np.zeros(count), 0.0, []
+    for place in places:
+        a, p = load_at(place, a, p)
+        found.append(p)
+    found = np.array(found)
+    turns = np.flatnonzero(np.diff(found)[1:] * np.diff(found)[:-1] < 0) + 1
+    fits = [np.polynomial.Polynomial.fit(places[i - 3 : i + 4], found[i - 3 : i + 4], 6) for i in turns]
+    centres = [min(fit.deriv().roots(), key=lambda root, i=i: abs(root - places[i])).real for fit, i in zip(fits, turns)]
+    return np.array([fit(centre) for fit, centre in zip(fits, centres)])
 
 
 def test_the_page_of_sbml_runs():

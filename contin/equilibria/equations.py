@@ -10,6 +10,8 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.collocation.mesh import MeshControl
+from contin.core.differences import derivative
+from contin.core.multilinear import of_lines
 from contin.core.protocol import Carrier, Discretization
 from contin.core.rounding import may_be_on_axis, off_axis
 from contin.core.scales import Scales, usual
@@ -194,6 +196,8 @@ class AlgebraicEquations(Spectral, System):
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return it along several stacks of directions, shape (K, size) each or, of states alone, (K, n); (K, equations)."""
         n, count = self.state_size, len(directions[0])
+        if self.problem.jacobian is not None and self.problem.batch("residual").interpreted is not None:
+            return np.array([self._along_given(x, [stack[k] for stack in directions]) for k in range(count)])
         u, p = np.repeat(x[:n].reshape(1, -1), count, axis=0), self._scaled_parameters(x)
         wide = [np.zeros((count, n + p.size)) for _ in directions]
         for inputs, stack in zip(wide, directions):
@@ -201,6 +205,23 @@ class AlgebraicEquations(Spectral, System):
             inputs[:, n + self._free] = stack[:, n:] if stack.shape[1] > n else 0.0
         found: Array = self._residual.along(np.zeros(count), u, self._none, p, wide)
         return found
+
+    def _along_given(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along directions by differences of the user's Jacobian, in place of the residual's.
+
+        One difference fewer: of a residual that is evaluated in Python those of second order have the round-off of its sums.
+        """
+        *others, last = (np.append(v, np.zeros(x.size - v.size)) for v in directions)
+
+        def product(at: Array) -> Array:
+            found: Array = self._jacobian(at)[1] @ last
+            return found
+
+        def bend(v: Array) -> Array:
+            found: Array = derivative(lambda s: product(x + s * v), len(others), 1 / np.abs(v).max())[0]
+            return found
+
+        return of_lines(bend, others) if others else product(x)
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""
