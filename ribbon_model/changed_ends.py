@@ -12,16 +12,20 @@ What is left over is a reaction that no load replaces: then the state is no equi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin import Point
 from contin.lowlevel import Collocation, correct, point_of
 from ribbon_model import ends
-from ribbon_model.ends import ANGLES, FREE, PLACE
+from ribbon_model.ends import ANGLES, FREE, PLACE, End
 from ribbon_model.loads import FORCES, STROKE
 from ribbon_model.open_strip import OpenStrip
+
+if TYPE_CHECKING:
+    from ribbon_model.network import Network
 
 #: A condition at the ends that is missed by less, relative to 1 + the largest force or moment there, holds: states are known
 #: to 1e-9 and better.
@@ -49,7 +53,9 @@ def with_ends(strip: OpenStrip, point: Point, follow: str, numbers: Mapping[str,
         The state is no equilibrium with the new ends; one sentence.
     """
     states = point.system.states(point.x)
-    values = _balanced(strip, states, _values(strip, point.parameters, states[-1, :7])) | dict(numbers or {})
+    replacing = [name for name in (*FORCES, "moment") if name in strip.numbers]
+    values = _values(strip, point.parameters, states[-1, :7])
+    values = balanced(strip, states, values, replacing, _unbalanced(strip, states)) | dict(numbers or {})
     free = (follow, *strip.problem.multipliers)
     system = Collocation(strip.problem, point.system.mesh, point.system.degree, free, values)
     return system, system.pack(states, values)
@@ -67,11 +73,15 @@ def _values(strip: OpenStrip, before: Mapping[str, float], last: np.ndarray) -> 
     }  # fmt: skip
     if finish.rotation == FREE:
         return values
-    known = [before.get(name, 0.0) for name in ANGLES]
-    missed = ends.rotation_conditions(finish)(q, ends.prescribed(*known))
-    if ANGLES[0] in before and max(map(abs, missed), default=0.0) < _SAME:
-        return values
-    return values | dict(zip(ANGLES, angles_near(q, known)))
+    known = [before.get(name, 0.0) for name in ANGLES] if ANGLES[0] in before else None
+    return values | dict(zip(ANGLES, held_angles(finish, q, known)))
+
+
+def held_angles(end: End, q, known: Sequence[float] | None) -> tuple[float, ...]:
+    """Return turn, bend and swing that an end with a quaternion has: the known ones where they hold it so, or next to them."""
+    if known is not None and max(map(abs, ends.rotation_conditions(end)(q, ends.prescribed(*known))), default=0.0) < _SAME:
+        return tuple(known)
+    return angles_near(q, known or (0.0, 0.0, 0.0))
 
 
 def angles_near(q, near) -> tuple[float, float, float]:
@@ -98,24 +108,29 @@ def corrected(strip: OpenStrip, near: Collocation, states: np.ndarray, values: M
     return point_of(system, correct(system, system.pack(states, values)).x)
 
 
-def _balanced(strip: OpenStrip, states: np.ndarray, values: dict[str, float]) -> dict[str, float]:
+def balanced(
+    strip: OpenStrip | Network, states: np.ndarray, values: dict[str, float], replacing: Sequence[str], unbalanced: str
+) -> dict[str, float]:  # fmt: skip
     """Return the values with the loads and multipliers that replace the reactions.
 
     Raises
     ------
     ValueError
+        A condition does not hold, or a reaction is replaced by nothing: ``unbalanced``.
     """
-    problem, names = strip.problem, [name for name in (*FORCES, "moment") if name in strip.numbers]
-    values, left = fitted(strip, states, values, [*names, *problem.multipliers])
+    problem = strip.problem
+    values, left = fitted(strip, states, values, [*replacing, *problem.multipliers])
     conditions = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
     if left[:conditions].max(initial=0.0) > _HOLDS:
         raise ValueError("they hold a place or a rotation that the state does not have (the first end has moved or turned)")
-    if left[conditions:].max(initial=0.0) > _HOLDS * (1 + np.abs(states[[0, -1], 7:]).max()):
-        raise ValueError(_unbalanced(strip, states))
+    if left[conditions:].max(initial=0.0) > _HOLDS * (1 + np.abs(states[[0, -1], states.shape[1] // 2 :]).max()):
+        raise ValueError(unbalanced)
     return values
 
 
-def fitted(strip: OpenStrip, states: np.ndarray, values: dict[str, float], unknown) -> tuple[dict[str, float], np.ndarray]:
+def fitted(
+    strip: OpenStrip | Network, states: np.ndarray, values: dict[str, float], unknown
+) -> tuple[dict[str, float], np.ndarray]:
     """Return the values with those of the unknown numbers that fit the conditions at the ends best, and what is left."""
     problem, order = strip.problem, list(strip.problem.parameters)
     p = np.array([values.get(name, problem.parameters[name]) for name in order])

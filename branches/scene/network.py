@@ -15,7 +15,8 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.fields import StepConfig, Strict
 from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
-from ribbon_model.ends import DIRECTIONS
+from ribbon_model.changed_supports import replacing
+from ribbon_model.ends import DIRECTIONS, FREE_END, End
 from ribbon_model.network import (
     BALL,
     FINISH,
@@ -126,6 +127,12 @@ def _force(value: Any) -> Any:
     return {"force": value} if isinstance(value, list) else value
 
 
+class NetworkStageConfig(FollowConfig):
+    """A stage of a network; from there on, joints may be held otherwise."""
+
+    held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints from here on (as before)")
+
+
 class NetworkDirections(Strict):
     """Where loads point to."""
 
@@ -156,7 +163,7 @@ class NetworkScene(StagedScene):
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: NetworkDirections = NetworkDirections()
     magnetized: Literal["width", "normal", "tangent"] = "tangent"
-    stages: list[FollowConfig] = Field(min_length=1, max_length=50)
+    stages: list[NetworkStageConfig] = Field(min_length=1, max_length=50)
     mesh: OpenMesh = OpenMesh(degree=6)
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1)
@@ -179,17 +186,44 @@ class NetworkScene(StagedScene):
                     raise ValueError(f"{name!r} is not usable as a name (letters, digits and _)")
         if (self.material is None) == (not self.sections):
             raise ValueError("material, sections: give one of them")
+        if self.stages[0].held or self.stages[0].numbers:
+            raise ValueError("stage 1: held, numbers: those of the scene are the first stage's")
         self.check_stages([f"{name}_{axis}" for name in self.strip().joints for axis in "xyz"])
         return self
 
     # --- the network --------------------------------------------------------------------------------------------------
 
     def strip(self, stage: int = 1) -> Network:
-        """Return the network, which is the same in all stages; raise ValueError for fields that do not fit."""
-        return self._network
+        """Return the network of a stage; raise ValueError for fields that do not fit."""
+        key = repr(self._held(stage))
+        if key not in self._networks:
+            held, changed = self._held(stage)
+            try:
+                self._networks[key] = self._network(held, changed)
+            except ValueError as error:
+                raise ValueError(f"stage {stage}: {error}" if changed else str(error)) from error
+        return self._networks[key]
 
     @functools.cached_property
-    def _network(self) -> Network:
+    def _networks(self) -> dict[str, Network]:
+        """The networks of all stages by what is held."""
+        return {}
+
+    def _held(self, stage: int) -> tuple[dict[str, End], tuple[str, ...]]:
+        """Return what is held in a stage, and the joints at which that has changed since the first one."""
+        if stage == 1:
+            return {name: end.end() for name, end in self.held.items()}, ()
+        one = self.stages[stage - 1]
+        held, changed = self._held(one.stage or stage - 1)
+        held = held | {name: end.end() for name, end in one.held.items()}
+        return {name: end for name, end in held.items() if end != FREE_END}, tuple(dict.fromkeys((*changed, *one.held)))
+
+    def replacing(self, stage: int) -> tuple[str, ...]:
+        """Return the names of the loads that replace reactions in a stage."""
+        held, changed = self._held(stage)
+        return tuple(number for name in changed for number in replacing(name, held.get(name)))
+
+    def _network(self, held: dict[str, End], changed: tuple[str, ...]) -> Network:
         sections = self._sections()
         members, joints = self._drawn(sections), {}
         cuts: dict[str, list[float]] = {}
@@ -213,11 +247,18 @@ class NetworkScene(StagedScene):
             kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
             joints[name] = Joint(ends, kind, joint.hinge or DIRECTIONS["width"])
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
+        for name in changed:
+            if name not in joints:
+                raise ValueError(f"held: {name!r} must be one of {', '.join(joints)}")
+        loads |= {number: load for name in changed for number, load in replacing(name, held.get(name)).items()}
         told = {name for stage in self.stages for name in (stage.follow, *stage.numbers)}
         numbers = dict.fromkeys((name for name in POTENTIALS if name in told), 0.0) | self.numbers
         where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
-        held = {name: end.end() for name, end in self.held.items()}
-        return Network(sections, members, joints, held, loads, numbers, where.weight, where.pressure, where.field, first)
+        directions = where.weight, where.pressure, where.field, first
+        if changed:  # a support that is let go has no numbers
+            known = Network(sections, members, joints, held, loads, {}, *directions).known
+            numbers = {name: value for name, value in numbers.items() if name in known}
+        return Network(sections, members, joints, held, loads, numbers, *directions)
 
     def _sections(self) -> dict[str, Section]:
         given = self.sections if self.material is None else {"strip": self.material}

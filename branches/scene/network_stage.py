@@ -11,6 +11,7 @@ from branches.scene.fields import ConfigError
 from branches.scene.open_stage import OpenStage, newton_of
 from contin import ContinError, MeshControl, Point
 from contin.lowlevel import Collocation, Continuation
+from ribbon_model.changed_supports import held_at, with_supports
 from ribbon_model.ends import ANGLES
 from ribbon_model.network import ASSEMBLY, MOVES
 
@@ -21,7 +22,7 @@ _AXES = "xyz"
 class NetworkStage(OpenStage):
     """A stage of a scene of a network."""
 
-    has_barriers = False
+    has_barriers, supports = False, "held"
 
     def __init__(self, scene, number: int):
         super().__init__(scene, number)
@@ -42,10 +43,7 @@ class NetworkStage(OpenStage):
         return point
 
     def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
-        values = {**origin.parameters, **numbers}
-        free = (self.follow, *self.problem.multipliers)
-        system = Collocation(self.problem, origin.system.mesh, origin.system.degree, free, values)
-        return system, system.pack(origin.system.states(origin.x), values)
+        return with_supports(self.strip, origin, self.follow, self.scene.replacing(self.number), numbers)
 
     def sizes(self, system: Collocation, x: np.ndarray) -> Mapping[str, float]:
         return {}  # the problem has its own
@@ -63,13 +61,20 @@ class NetworkStage(OpenStage):
     # --- columns --------------------------------------------------------------------------------------------------------
 
     def found_names(self, numbers: Collection[str]) -> tuple[str, ...]:
-        network = self.strip
-        places = [f"{joint}_{axis}" for joint in network.joints for axis in _AXES]
-        reactions = [f"{kind}_{joint}_{axis}" for joint in network.held for kind in "FM" for axis in _AXES]
-        return ("potential", *places, *reactions, *(("floating",) if network.floats else ()))
+        networks = [self.scene.strip(number) for number in range(1, len(self.scene.stages) + 1)]
+        places = [f"{joint}_{axis}" for joint in self.strip.joints for axis in _AXES]
+        held = dict.fromkeys(joint for network in networks for joint in network.held)
+        reactions = [f"{kind}_{joint}_{axis}" for joint in held for kind in "FM" for axis in _AXES]
+        return ("potential", *places, *reactions, *(("floating",) if any(network.floats for network in networks) else ()))
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
-        return {**point.parameters, **point.functionals, **self.found(point)}
+        """Loads and reactions that do not act are zero; displacements and rotations that are not prescribed are those found."""
+        found = {**point.parameters, **point.functionals, **self.found(point)}
+        absent = {name: 0.0 for name in names if name not in found}
+        for joint in self.strip.joints:
+            if any(f"{joint}_{move}" in absent for move in (*MOVES, *ANGLES)):
+                absent |= held_at(self.strip, point, joint)
+        return absent | found
 
     def found(self, point: Point) -> dict[str, float]:
         network = self.strip
@@ -106,6 +111,12 @@ class NetworkStage(OpenStage):
 
     def words(self, name: str) -> tuple[str, str]:
         network = self.strip
+        joint, _, last = name.rpartition("_")
+        replaced = None if name in self.scene.loads else re.fullmatch(r"(\w+)_(force_([xyz])|moment)", name)
+        if replaced and replaced[1] in network.joints:
+            place, _, axis = replaced.groups()
+            what = f"dead force at {place} along {axis}" if axis else f"dead moment at the hinge {place}"
+            return f"{what}, once its support has changed", what.removeprefix("dead ")
         if name in network.loads:
             return f"number of the load {name}", name
         if name == ASSEMBLY:
@@ -119,12 +130,11 @@ class NetworkStage(OpenStage):
         if found := re.fullmatch(r"([FM])_(\w+)_([xyz])", name):
             kind = "force" if found[1] == "F" else "moment"
             return f"{kind} on the network at {found[2]}, along {found[3]}", f"{kind} at {found[2]} along {found[3]}"
-        joint, _, last = name.rpartition("_")
         if joint in network.joints and last in _AXES:
             return f"place of {joint} along {last}", f"{last} of {joint}"
-        if joint in network.held and last in MOVES:
+        if joint in network.joints and last in MOVES:
             return f"prescribed displacement of {joint} along {last[1]}", f"displacement of {joint} along {last[1]}"
-        if joint in network.held and last in ANGLES:
+        if joint in network.joints and last in ANGLES:
             return f"prescribed rotation of {joint}: {last}", f"{last} of {joint}"
         number, _, section = name.rpartition("_")
         if section in network.sections:

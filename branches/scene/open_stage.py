@@ -92,6 +92,8 @@ class OpenStage(Stage):
     """A stage of an open scene."""
 
     starts_others = has_barriers = True
+    #: Fields that say what is held.
+    supports = "start, finish"
 
     def __init__(self, scene: OpenScene, number: int):
         self.scene, self.number, self.stage, self.strip = scene, number, scene.stages[number - 1], scene.strip(number)
@@ -230,7 +232,7 @@ class OpenStage(Stage):
             system, x = self.restated(origin, numbers)
             return Continuation(system, x, self._settings(system, x))
         except ValueError as error:
-            raise ConfigError(f"start, finish: {error}") from error
+            raise ConfigError(f"{self.supports}: {error}") from error
         except ConvergenceError as error:
             given = ", ".join(f"{name} = {exact_text(value)}" for name, value in stage.numbers.items())
             where = f"near the one before{f' with {given}' if given else ' with these ends'}"

@@ -194,6 +194,8 @@ MISTAKES = {
     "material: {B1: 1.0}": "material: the field 'law' is missing",
     "material: {law: rubber}": "material: law: 'rubber' must be one of",
     "stages: [{follow: Q, to: 1.0}]": "stage 1: follow: 'Q' must be one of the numbers here",
+    "stages: [{follow: P, to: 1.0, held: {A: free}}]": "stage 1: held, numbers: those of the scene are the first stage's",
+    "stages: [{follow: P, to: 1.0}, {follow: P, to: 2.0, held: {Z: free}}]": "stage 2: held: 'Z' must be one of A, cut, tip",
     "stages: [{follow: P, to: 1.0, limits: {tip_w: [0, 1]}}]": "stage 1: 'tip_w'",
 }
 
@@ -206,6 +208,79 @@ def test_a_mistake_is_one_sentence(change):
         parse(text, "scene.yaml")
     assert MISTAKES[change] in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+# --- supports that change -----------------------------------------------------------------------------------------------
+
+_CHANGES = [  # of an open strip: what is followed, to which value, what is held; of the network of one strip
+    ("force_normal", -2.0, None, "P", None),
+    ("distance", 0.7, "clamped", "B_dz", "clamped"),
+    ("force_tangent", -8.0, "{slides_along: tangent}", "B_force_z", "{slides_along: [0, 0, 1]}"),
+    ("moment", 0.0, "{rotation: hinged, about: width, slides_along: tangent}",
+     "B_moment", "{rotation: hinged, about: [1, 0, 0], slides_along: [0, 0, 1]}"),
+]  # fmt: skip
+
+
+def test_supports_that_change_are_those_of_open_strips(run):
+    """A strip that is pushed, clamped, compressed, and let go twice: the network of one strip is the open strip."""
+    stages = [
+        (f"  - {{follow: {one}, to: {to}{f', finish: {end}' if end else ''}}}\n",
+         f"  - {{follow: {other}, to: {to - (one == 'distance')}{f', held: {{B: {held}}}' if held else ''}}}\n")
+        for one, to, end, other, held in _CHANGES
+    ]  # fmt: skip
+    strip = run(f"material: {ROD}\nfinish: free\nstages:\n" + "".join(one for one, _ in stages))
+    known = [strip.points[strip.stage_of == number][-1] for number in range(1, 5)]
+    network = run(
+        f"material: {ROD}\nstrips: {{beam: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}}}\n"
+        "joints: {A: [beam start], B: [beam finish]}\nheld: {A: clamped}\nloads: {P: {B: [0, 1, 0]}}\nstages:\n"
+        + "".join(other for _, other in stages)
+    )
+    for number, there in enumerate(known, 1):
+        here = network.points[network.stage_of == number][-1]
+        for name, same in (
+            ("energy", "energy"), ("index", "index"), ("B_y", "rise"), ("B_z", "distance"), ("B_bend", "bend"),
+            ("F_A_y", "start_F_normal"), ("F_A_z", "start_F_tangent"), ("M_A_x", "start_M_width"), ("F_B_z", "F_tangent"),
+        ):  # fmt: skip
+            if same != "F_tangent" or number == 2:  # a dead force is none of a support: F_tangent has both
+                assert here[name] == pytest.approx(there[same], abs=1e-7)  # the open strip rounds numbers that go on to 1e-9
+        assert here["B_dz"] == pytest.approx(there["distance"] - 1, abs=1e-7)
+
+
+ROLLERS = f"""
+material: {ROD}
+strips: {{beam: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}}}
+joints: {{A: [beam start], M: [beam at 0.5], Q: [beam at 0.25]}}
+held: {{A: clamped, M: {{rotation: free, slides_in_plane: [0, 1, 0]}}}}
+stages:
+  - {{follow: M_dy, to: -0.2}}
+  - {{follow: Q_dy, to: -0.04, held: {{Q: {{rotation: free, slides_in_plane: [0, 1, 0]}}}}}}
+  - {{follow: M_force_y, to: 0.0, held: {{M: free}}}}
+  - {{follow: Q_force_y, to: 0.0, held: {{Q: free}}}}
+"""
+
+
+def test_rollers_that_come_and_go(run):
+    """A second roller begins where the strip is, without force; let go one after the other, the strip is straight again."""
+    branch = run(ROLLERS)
+    first, second, third, last = (branch.points[branch.stage_of == number] for number in range(1, 5))
+    assert second[0]["F_Q_y"] == pytest.approx(0, abs=1e-8)
+    assert second[0]["energy"] == pytest.approx(first[-1]["energy"], abs=1e-10)
+    assert third[0]["M_force_y"] == pytest.approx(second[-1]["F_M_y"], abs=1e-8)
+    assert third["F_M_y"] == pytest.approx(0, abs=0)
+    assert len(branch.shape(int(np.flatnonzero(branch.stage_of == 2)[0])).fixtures) == 3
+    assert len(branch.shape(len(branch.points) - 1).fixtures) == 1
+    assert last[-1]["energy"] == pytest.approx(0, abs=1e-12)
+    assert last[-1]["Q_dy"] == pytest.approx(0, abs=1e-9)
+    assert last[-1]["M_dy"] == pytest.approx(0, abs=1e-9)  # it is not prescribed there, and found
+
+
+def test_reactions_that_no_load_replaces_are_told(tmp_path):
+    """A moment at a clamp that becomes a ball joint: no dead moment has an energy there."""
+    text = CANTILEVER.replace("tip: [0, 0, -1]", "tip: [0, 1, 0]")
+    text += "  - {follow: P, to: 2.0, held: {A: ball joint, tip: clamped}}\n"
+    path = tmp_path / "result.h5"
+    assert run_scene(parse(text, "scene.yaml"), path, Display(silent=True)) == "lost"
+    assert read_branch(path).stop.startswith("stage 2: held: the supports let go of what no load replaces")
 
 
 # --- joints, as pictures show them --------------------------------------------------------------------------------------
