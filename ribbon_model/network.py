@@ -39,10 +39,11 @@ from contin import (
     solve,
     trace,
 )
-from contin.lowlevel import Collocation, Continuation, Undetermined
+from contin.lowlevel import Collocation, Continuation, Undetermined, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads, natural_state
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
+from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section
 from ribbon_model.shape import Shape, quaternions, shape_of
 
@@ -269,6 +270,8 @@ class Network:
         pressure acts from outside; the direction of a uniform field.
     magnetized : int
         The number (0, 1, 2) of the director along which strips are magnetized.
+    phases : sequence of Phase
+        Of a network that can shift along itself (`with_phases`, `with_waves`).
 
     Raises
     ------
@@ -302,6 +305,7 @@ class Network:
     pressure_normal: Vector = (1.0, 0.0, 0.0)
     field_direction: Vector = (0.0, 1.0, 0.0)
     magnetized: int = 2
+    phases: Sequence[Phase] = ()
 
     def __post_init__(self) -> None:
         for name in ("weight_direction", "pressure_normal", "field_direction"):
@@ -408,22 +412,38 @@ class Network:
             Conditions that repeat or contradict each other.
         """
         densities: dict[tuple, Callable] = {}
-        segments = []
-        for member in self.members.values():
+        segments, phases = [], [f"phase_{number}" for number in range(len(self.phases))]
+        for place, member in enumerate(self.members.values()):
             homogeneous = self.sections[member.section].homogeneous
-            key = member.section, member.strains, None if homogeneous else member.length
+            differs = place if phases else None
+            key = member.section, member.strains, None if homogeneous else member.length, differs
             if key not in densities:
-                densities[key] = self._hamiltonian(member)
-            segments.append(VariationalSegment(None, (*FRAME, *CENTRELINE), member.length, hamiltonian=densities[key]))
+                densities[key] = self._hamiltonian(member, place)
+            states = (*FRAME, *CENTRELINE, *phases)
+            segments.append(VariationalSegment(None, states, member.length, hamiltonian=densities[key]))
         return SegmentedVariationalProblem(
-            segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes
-        )
+            segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
+            phases=self._named(phases),
+        )  # fmt: skip
 
-    def _hamiltonian(self, member: Member) -> Callable:
+    def _named(self, states: Sequence[str]) -> list[str]:
+        """Return the names of states of all members among all states."""
+        count = len(self.members)
+        return [f"{name}_{number}" if count > 1 else name for number in range(count) for name in states]
+
+    @functools.cached_property
+    def places(self) -> list[list[int]]:
+        """Places of quaternion, centreline, and their multipliers (14) of each member among all states."""
+        own = range(len(FRAME) + len(CENTRELINE))
+        shift = len(own) + len(self.phases)
+        return [[*(piece.at[i] for i in own), *(piece.at[shift + i] for i in own)] for piece in self.problem.pieces]
+
+    def _hamiltonian(self, member: Member, place: int) -> Callable:
         section, length, name = self.sections[member.section], member.length, member.section
         complementary, own = section.hamiltonian(), tuple(section.parameters)
         numbers, full = namedtuple("Numbers", own), [self._full(name, number) for number in own]
         homogeneous, potential = section.homogeneous, self._distributed()
+        phases, count = self.phases, len(self.members)
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
 
         def hamiltonian(s, x, lam, p):
@@ -434,7 +454,10 @@ class Network:
             for number, strain in drawn.items():
                 values[number] = p.assembly * values[number] + (1 - p.assembly) * strain
             value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*values))
-            return value + n1 * d[6] + n2 * d[7] + n3 * d[8] - p.assembly * potential(x, d, p)
+            value = value + n1 * d[6] + n2 * d[7] + n3 * d[8] - p.assembly * potential(x, d, p)
+            for phase, multiplier in zip(phases, lam[7:]):
+                value = value + multiplier * phase.density(place, s / length, x, count) / length
+            return value
 
         return hamiltonian
 
@@ -459,6 +482,7 @@ class Network:
         joints = list(self.joints.items())
         held = [(name, *self._prescribing(name, end)) for name, end in self.held.items()]
         floating = self._floating() if self.floats else None
+        holding = [phase.holds for phase in self.phases]
         gaps, readers = self._gaps, {name: self._reader(joint) for name, joint in self.joints.items()}
 
         def conditions(a, b, p):
@@ -476,6 +500,8 @@ class Network:
             for name, frame_of, place_of, rotation, position in held:
                 frame, place = readers[name](a, b, p)[0]
                 found += [*rotation(frame, frame_of(p)), *position(place, place_of(p))]
+            for number, holds in enumerate(holding, 7):
+                found += [x[number] for x in a] + ([sum(x[number] for x in b)] if holds else [])
             return found + (floating(a) if floating else [])
 
         return conditions
@@ -580,7 +606,7 @@ class Network:
 
     def guess(self) -> list[Callable]:
         """Return the drawing as a guess, one function of s for each member."""
-        return [functools.partial(_drawn_at, member) for member in self.members.values()]
+        return [functools.partial(_drawn_at, member, len(self.phases)) for member in self.members.values()]
 
     def first_point(
         self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options
@@ -622,15 +648,74 @@ class Network:
         except ContinError as error:  # the way has come there: what fails is the matrix
             raise ProblemError(MECHANISM) from error
 
+    def with_phases(self, point: Point, nullity: int = 2, free: int = 1) -> tuple[Network, Point]:
+        """Return the network with phases that hold neutral modes of a state, and the state as one of it.
+
+        Parameters
+        ----------
+        point : Point
+            A state of this network.
+        nullity : int
+            Number of its modes that cost no energy. Where a family of branches leaves, there are two.
+        free : int
+            Number of modes that are not held: with one of two, one branch of the family leaves.
+        """
+        variation, system = point.second_variation(), point.system
+        at = np.array([places[:7] for places in self.places])
+
+        def phase(number: int) -> Phase:
+            states = functools.partial(system.evaluate, point.x)
+            return phase_along(lambda t: variation.modes(nullity, t)[number][:, at], lambda t: states(t)[:, at])
+
+        other = replace(self, phases=(*self.phases, *map(phase, range(free, nullity))))
+        return other, other.restated(point)
+
+    def with_waves(self, waves: int) -> Network:
+        """Return the network with a phase of so many sine waves along all members, in their order, across the drawing."""
+        ends = np.cumsum([0.0, *(member.length for member in self.members.values())])
+
+        def drawn(t: np.ndarray) -> np.ndarray:
+            return np.stack([member.drawn(member.length * t) for member in self.members.values()], axis=1)
+
+        def mode(t: np.ndarray) -> np.ndarray:
+            found = np.zeros((len(t), len(self.members), 7))
+            q = drawn(t)[:, :, :4]
+            across = np.array(directors(*np.moveaxis(q, 2, 0)))[:6].reshape(2, 3, *q.shape[:2]).sum(axis=0)
+            angle = 2 * math.pi * waves * (ends[:-1] + np.multiply.outer(t, np.diff(ends))) / ends[-1]
+            found[:, :, 4:] = np.moveaxis(across, 0, 2) * np.sin(angle)[:, :, None]
+            return found
+
+        return replace(self, phases=(*self.phases, phase_along(mode, drawn)))
+
+    def restated(self, point: Point) -> Point:
+        """Return a state of the same network with other phases as one of this; a branch point is located again.
+
+        Raises
+        ------
+        ConvergenceError
+            There is no branch point of this network.
+        """
+        old, multipliers = point.system, self.problem.multipliers
+        states, names = old.states(point.x), old.problem.state_names
+        found = [states[:, names.index(name)] if name in names else 0 * states[:, 0] for name in self.problem.state_names]
+        values = {name: point.parameters.get(name, 0.0) for name in self.problem.parameters}
+        free = [*(name for name in old.free if name not in old.problem.multipliers), *multipliers]
+        system = self.problem.discretized(free, values, None, old.mesh, old.degree)
+        x = system.pack(np.array(found).T, values)
+        if point.label != "BP":
+            return point_of(system, x)
+        branch_point = locate_branch_point(system, x)
+        return replace(point_of(system, branch_point.x), label="BP", details=branch_point)
+
     def _moved_by(self, point: Point, guess: Any) -> float:
         """Return by how much a state is away from a guess: quaternions, and places over the longest length."""
         if not isinstance(guess, list):
             return 0.0
         states, t, away = point.system.states(point.x), point.system.nodes, 0.0
         length = max(member.length for member in self.members.values())
-        for member, piece, begun in zip(self.members.values(), self.problem.pieces, guess):
+        for member, places, begun in zip(self.members.values(), self.places, guess):
             drawn = np.array([np.asarray(begun(member.length * s) if callable(begun) else begun)[:7] for s in t])
-            change = np.abs(states[:, list(piece.at[:7])] - drawn) / np.repeat([1.0, length], [4, 3])
+            change = np.abs(states[:, places[:7]] - drawn) / np.repeat([1.0, length], [4, 3])
             away = max(away, float(change.max()))
         return away
 
@@ -664,7 +749,8 @@ class Network:
         found |= dict.fromkeys([name for name in (*self.loads, *POTENTIALS) if name in found], force)
         for number in range(len(self.members)):
             behind = f"_{number}" if len(self.members) > 1 else ""
-            for names, size in ((FRAME, 1.0), (CENTRELINE, length)):
+            phases = [f"phase_{number}" for number in range(len(self.phases))]
+            for names, size in ((FRAME, 1.0), (CENTRELINE, length), (phases, 1.0)):
                 found |= {f"{name}{behind}": size for name in names} | {f"lam_{name}{behind}": force for name in names}
         return found
 
@@ -678,10 +764,10 @@ class Network:
     def _ends(self) -> list[tuple[Section, list[Event]]]:
         """Return the section of each member, with the test function that ends a run where its law ends."""
         found = []
-        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
+        for (name, member), places in zip(self.members.items(), self.places):
             section = self.sections[member.section]
             names = {number: self._full(member.section, number) for number in section.parameters}
-            place = law_end.Place(functools.partial(self._strains_of, name), piece.at, names)
+            place = law_end.Place(functools.partial(self._strains_of, name), tuple(places), names)
             found.append((section, law_end.tests(section, place)))
         return found
 
@@ -705,8 +791,8 @@ class Network:
     def strains_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> dict[str, np.ndarray]:
         """Return the same at parts t (K,) of the lengths, from states (K, n) and the values of all parameters."""
         rates, found = self.problem.batch("field").values(t, states, states[:0], p), {}
-        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
-            at = list(piece.at[:4])
+        for (name, member), places in zip(self.members.items(), self.places):
+            at = places[:4]
             found[name] = strains_of(states[:, at], rates[:, at]) / member.length
         return found
 
@@ -718,8 +804,8 @@ class Network:
     def shapes_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> dict[str, Shape]:
         """Return the same from states (K, n) at parts t (K,) of the lengths and the values of all parameters."""
         strains, found = self.strains_at(t, states, p), {}
-        for (name, member), piece in zip(self.members.items(), self.problem.pieces):
-            found[name] = shape_of(member.length * t, states[:, list(piece.at)], strains[name])
+        for (name, member), places in zip(self.members.items(), self.places):
+            found[name] = shape_of(member.length * t, states[:, places], strains[name])
         return found
 
     def reactions(self, point: Point) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -777,7 +863,7 @@ class Network:
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:
         """Return quaternion, place, and their multipliers (14,) at an end."""
         number = list(self.members).index(each.member)
-        row: np.ndarray = point.system.states(point.x)[0 if each.end == START else -1, list(self.problem.pieces[number].at)]
+        row: np.ndarray = point.system.states(point.x)[0 if each.end == START else -1, self.places[number]]
         return row
 
     def _arm(self, point: Point, each: JointEnd, arm: Vector) -> np.ndarray:
@@ -791,7 +877,7 @@ class Network:
         if self._end_energy is None:
             return point["energy"]
         states, rows = point.system.states(point.x), namedtuple("State", (*FRAME, *CENTRELINE))
-        first, last = ([rows(*states[end, list(piece.at[:7])]) for piece in self.problem.pieces] for end in (0, -1))
+        first, last = ([rows(*states[end, places[:7]]) for places in self.places] for end in (0, -1))
         return point["energy"] + float(self._end_energy(first, last, SimpleNamespace(**point.parameters)))
 
 
@@ -827,5 +913,5 @@ def _at_arm(state: np.ndarray, arm: Vector) -> np.ndarray:
     return np.array(_moved(list(map(float, state)), arm))
 
 
-def _drawn_at(member: Member, s: float) -> np.ndarray:
-    return member.drawn([s])[0]
+def _drawn_at(member: Member, phases: int, s: float) -> np.ndarray:
+    return np.append(member.drawn([s])[0], np.zeros(phases))

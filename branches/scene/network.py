@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -131,6 +132,12 @@ class NetworkStageConfig(FollowConfig):
     """A stage of a network; from there on, joints may be held otherwise."""
 
     held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints from here on (as before)")
+    phase: int | None = Field(
+        None,
+        ge=1,
+        le=20,
+        description="of a loop that floats: hold the sine of so many waves, so that it cannot shift",
+    )
 
 
 class NetworkDirections(Strict):
@@ -195,11 +202,11 @@ class NetworkScene(StagedScene):
 
     def strip(self, stage: int = 1) -> Network:
         """Return the network of a stage; raise ValueError for fields that do not fit."""
-        key = repr(self._held(stage))
+        key = repr((self._held(stage), self.stages[stage - 1].phase))
         if key not in self._networks:
             held, changed = self._held(stage)
             try:
-                self._networks[key] = self._network(held, changed)
+                self._networks[key] = self._phased(self._network(held, changed), self.stages[stage - 1].phase)
             except ValueError as error:
                 raise ValueError(f"stage {stage}: {error}" if changed else str(error)) from error
         return self._networks[key]
@@ -208,6 +215,14 @@ class NetworkScene(StagedScene):
     def _networks(self) -> dict[str, Network]:
         """The networks of all stages by what is held."""
         return {}
+
+    def _phased(self, network: Network, held: int | None) -> Network:
+        """Return a network with the states of the phases of all stages, of which one holds."""
+        waves = list(dict.fromkeys(stage.phase for stage in self.stages if stage.phase is not None))
+        if waves and not network.floats:
+            raise ValueError("stages: phase: a network that is held does not shift; leave it out, or hold nothing")
+        phases = [network.with_waves(count).phases[0] for count in waves]
+        return replace(network, phases=[replace(phase, holds=held == count) for phase, count in zip(phases, waves)])
 
     def _held(self, stage: int) -> tuple[dict[str, End], tuple[str, ...]]:
         """Return what is held in a stage, and the joints at which that has changed since the first one."""

@@ -45,6 +45,17 @@ class NetworkStage(OpenStage):
     def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
         return with_supports(self.strip, origin, self.follow, self.scene.replacing(self.number), numbers)
 
+    def _begun(self, origin: Point) -> Continuation:
+        if self.stage.phase is not None and origin.system.problem is not self.problem:
+            try:
+                origin = self.strip.restated(origin)
+            except ContinError as error:
+                waves = self.stage.phase
+                raise ConfigError(
+                    f"phase: with {waves} waves held, no single branch leaves; try another number of waves"
+                ) from error
+        return super()._begun(origin)
+
     def sizes(self, system: Collocation, x: np.ndarray) -> Mapping[str, float]:
         return {}  # the problem has its own
 

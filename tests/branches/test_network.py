@@ -58,6 +58,7 @@ KNOWN = {
     "network_right_angle": ("M", "BP", math.pi * math.sqrt(1.526717557251908 / 2), (0, 1)),
     "network_ring_pressure": ("pressure", "BP", 3.0, (0, 1)),
     "network_hexagon": ("kappa_n", "BP", 1.0088095252717388, (0, 2)),
+    "network_loop": ("kappa_n", "BP", 5 * math.pi, (0, 2)),
     "network_overcurved": (
         "kappa_n", "BP",
         2 * math.pi * (1 + (-(1 / 16 + 1 / 1.5) + math.sqrt((1 / 16 + 1 / 1.5) ** 2 + 12 / 24)) * 12), (0, 2),
@@ -75,6 +76,19 @@ def test_shipped_scenes_have_their_closed_forms(run, name):
     assert tuple(changes) == change
     if "floating" in branch.points.dtype.names:
         assert branch.points["floating"].max() < 1e-7
+
+
+def test_a_closed_strip_with_a_phase(run):
+    """The fold of (1, 2) without symmetry; `tests/ribbon_model/test_network_loop.py` compares more."""
+    ((fold, error, *change),) = _events(run("network_loop"), "LP", "kappa_n", 2)
+    assert fold / (2 * math.pi) == pytest.approx(4.0756675352654635, abs=max(error, 1e-10))
+    assert change == [0, 1]
+
+
+def test_a_phase_of_a_network_that_is_held(root):
+    text = (root / "configs" / "network_loop.yaml").read_text("utf-8")
+    with pytest.raises(ConfigError, match="phase: a network that is held does not shift"):
+        parse("held: {J: clamped}\n" + text, "scene.yaml")
 
 
 def test_the_portal_frame_in_all_stages(run):
