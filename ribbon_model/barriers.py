@@ -15,17 +15,17 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ribbon_model.descent import descend, modes
+from ribbon_model.descent import KICK, LONGEST, descend, modes
 from ribbon_model.second_variation import Equilibrium
 from ribbon_model.segments import Chain, Strip, discretized
 
 #: Segments to begin with, and at most: their number is doubled where both ways down lead to the same state, because the saddle
 #: of the segments lies further from that of the continuous strip than the kick leads.
 SEGMENTS, _MOST = 96, 400
-#: The kick: root mean square change of the strains, over 2 pi/L.
-_KICK = 0.02
-#: The same for open strips of length 1.
-KICK_OPEN = 2 * math.pi * _KICK
+#: The kick of open strips: root mean square change of the strains, over one over the length.
+KICK_OPEN = 2 * math.pi * KICK
+#: Times that a strip which rests in a saddle is kicked out of it.
+_KICKS = 5
 #: Root mean square difference of the strains, relative to that of one, of two states of an open strip at rest.
 _APART = 1e-3
 #: Difference of the strains from those of a circle, and of energies of the same state on the same segments, at rest.
@@ -60,11 +60,11 @@ def sides(saddle: Equilibrium) -> tuple[Strip, Strip] | None:
     def apart(first: Strip, last: Strip) -> bool:
         return abs(first.energy - last.energy) > _SAME * (1 + abs(first.energy))
 
-    return ways_down(lambda segments: discretized(saddle, segments), apart, _KICK)
+    return ways_down(lambda segments: discretized(saddle, segments), apart, KICK)
 
 
 def ways_down(
-    cut: Callable[[int], Segmented], apart: Callable[[Segmented, Segmented], bool], kick: float
+    cut: Callable[[int], Segmented], apart: Callable[[Segmented, Segmented], bool], kick: float, longest: float = LONGEST
 ) -> tuple[Segmented, Segmented] | None:
     """Return the strips at rest on both sides of a state of index 1; None where they cannot be told apart.
 
@@ -74,18 +74,32 @@ def ways_down(
         ``cut(N)`` returns the state as a strip of N segments.
     apart : callable
         ``apart(first, last)`` returns whether two strips at rest are two states.
-    kick : float
-        Root mean square change of the strains by which the state is left.
+    kick, longest : float
+        Root mean square change of the strains by which the state is left, and the largest one in a step.
     """
     segments = SEGMENTS
     while segments <= _MOST:
         strip = cut(segments)
         mode = modes(strip, 1)[1][:, 0]
-        ways = [descend(strip.moved(sign * kick * mode)) for sign in (1, -1)]
+        ways = [descend(strip.moved(sign * kick * mode), longest=longest) for sign in (1, -1)]
         first, last = (way.end for way in ways)
         if all(way.rests for way in ways) and apart(first, last):
             return first, last
         segments *= 2
+    return None
+
+
+def at_rest(strip: Segmented, kick: float, longest: float = LONGEST) -> Segmented | None:
+    """Return the strip at rest, at a minimum of the energy, into which one falls; None where it comes to none.
+
+    Where it rests at a saddle, as one with a symmetry may, it is kicked and falls on.
+    """
+    for _ in range(_KICKS):
+        way = descend(strip, longest=longest)
+        lowest, mode = modes(way.end, 1)
+        if not way.rests or lowest[0] > 0:
+            return way.end if way.rests else None
+        strip = way.end.moved(kick * mode[:, 0])
     return None
 
 

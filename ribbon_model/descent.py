@@ -40,6 +40,8 @@ GYRATION = 0.05
 PAST = 0.01
 #: Root mean square in the strains of the kick that it is given. A tenth only takes longer.
 KICK = 0.02
+#: Largest root mean square change of the strains in a step downhill. Ten times more may step over a minimum.
+LONGEST = 0.1
 #: Segments of such a strip. Twice as many take four times as long.
 SEGMENTS = 96
 
@@ -142,7 +144,9 @@ class _Tangent:
         return matrix - half - half.T
 
 
-def descend(strip: Strip, metric: str = "strain", longest: float = 0.1, tolerance: float = 1e-9, steps: int = 500) -> Descent:
+def descend(
+    strip: Strip, metric: str = "strain", longest: float = LONGEST, tolerance: float = 1e-9, steps: int = 500
+) -> Descent:
     """Follow the gradient flow of the energy from a closed strip to a state at rest.
 
     Linearly implicit steps, (G/dt + Hessian) change = -gradient. A step is shortened until G/(2 dt) + Hessian is positive, so

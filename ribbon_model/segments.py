@@ -67,6 +67,11 @@ class Chain:
         """Length of a segment."""
         raise NotImplementedError
 
+    @property
+    def asked(self) -> int:
+        """The number of segments that was asked for."""
+        return len(self.strains)
+
     @cached_property
     def _local(self):
         """a = h omega, and `_turn` of it."""

@@ -1,15 +1,16 @@
-"""Barriers of open strips: the energy by which a stable state must be pushed before it leaves, and what it falls into.
+"""Barriers and snaps of open strips and networks: what it takes to leave a stable state, and what it falls into.
 
 Stable states are looked at where a stage ends, and at the values that the scene labels. All states of the result with the same
 ends and the same numbers count: each is corrected between two points of the file. From a saddle of index 1 the strip, cut into
 segments, goes downhill to both sides (`ribbon_model.barriers`). Only saddles in the result are considered: another one may be
-lower.
+lower. A fold at which a stable piece ends is passed by a hundredth, and the strip goes downhill from there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +19,17 @@ from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point
 from contin.lowlevel import exact_text
-from ribbon_model.barriers import KICK_OPEN, Barrier, apart, barriers, ways_down
+from ribbon_model.barriers import KICK_OPEN, SEGMENTS, Barrier, apart, at_rest, barriers, ways_down
 from ribbon_model.changed_ends import corrected
-from ribbon_model.descent import descend
-from ribbon_model.open_segments import OpenChain, cut, unsupported
-from ribbon_model.open_strip import OpenStrip
+from ribbon_model.descent import LONGEST, descend, past
+from ribbon_model.equilibrium import CENTRELINE
+
+if TYPE_CHECKING:
+    from branches.scene.open_stage import OpenStage
+    from ribbon_model.network_segments import NetworkChain
+    from ribbon_model.open_segments import OpenChain
+
+    Chain = OpenChain | NetworkChain
 
 #: Two states whose places differ by less than this are one: they were corrected from two sides, on two meshes.
 _SAME = 1e-6
@@ -32,17 +39,17 @@ _EQUAL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A state of a result at some numbers: its name, what holds it, the corrected point, its index and its potential."""
+    """A state of a result at some numbers: its name, its stage, the corrected point, its index and its potential."""
 
     name: str
-    strip: OpenStrip
+    stage: OpenStage
     point: Point
     index: int
     potential: float
 
-    def chain(self, segments: int) -> OpenChain:
+    def chain(self, segments: int) -> Chain:
         """Return the state cut into segments."""
-        return cut(self.strip, self.point.system, self.point.x, segments)
+        return self.stage.chains.cut(self.stage.strip, self.point.system, self.point.x, segments)
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,8 @@ def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
             column = branch.followed(stage)
             place = Place(stage, column, float(branch.points[column][row]), states_at(branch, row), {})
             progress.part(_words(branch, place))
-            if {0, 1} <= {state.index for state in place.states} and not unsupported(branch.scene.strip(stage)):
+            mechanics = branch.stages[stage - 1]
+            if {0, 1} <= {state.index for state in place.states} and not mechanics.chains.unsupported(mechanics.strip):
                 place.ways.update(_ways(place.states))
                 found.append(place)
             progress.part_done()
@@ -85,46 +93,57 @@ def chosen_rows(branch: OpenBranch, stable: bool = False) -> Iterator[int]:
             yield row
 
 
-def states_at(branch: OpenBranch, row: int) -> list[State]:
-    """Return all states of a result that have the ends and the numbers of one of its points."""
+def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[State]:
+    """Return all states of a result that have the ends and the numbers of one of its points.
+
+    A ``value`` is that of the number which is followed there, in place of the point's.
+    """
     found: list[State] = []
     for piece in branch.pieces():
         name = branch.followed(piece.stage)
         if not branch.same_strip(piece.rows[0], row, name):
             continue
-        x, value = branch.points[name][piece.rows], float(branch.points[name][row])
-        for i in np.flatnonzero((x[:-1] - value) * (x[1:] - value) <= 0):
+        here = branch.followed(int(branch.points["stage"][row]))
+        if value is not None and name != here:
+            continue
+        x, at = branch.points[name][piece.rows], float(branch.points[name][row]) if value is None else value
+        for i in np.flatnonzero((x[:-1] - at) * (x[1:] - at) <= 0):
             pair = piece.rows[i], piece.rows[i + 1]
-            part = 0.0 if x[i] == x[i + 1] else float((value - x[i]) / (x[i + 1] - x[i]))
-            state = _between(branch, pair, part, row)
+            part = 0.0 if x[i] == x[i + 1] else float((at - x[i]) / (x[i + 1] - x[i]))
+            state = _between(branch, pair, part, row, {} if value is None else {here: value})
             if state is not None and not any(_same(state, other) for other in found):
                 found.append(state)
     return found
 
 
-def _between(branch: OpenBranch, pair, part: float, row: int) -> State | None:
-    """Return the state at the numbers of a point, from two neighbouring points of the file; None if there is none nearby."""
-    strip = branch.scene.strip(int(branch.points["stage"][row]))
+def _between(branch: OpenBranch, pair, part: float, row: int, others: dict[str, float]) -> State | None:
+    """Return the state at the numbers of a point, from two neighbouring points of the file; None if there is none nearby.
+
+    ``others`` are numbers that are not those of the point.
+    """
+    stage = branch.stages[int(branch.points["stage"][row]) - 1]
+    strip = stage.strip
     kept = set(branch.kept().tolist())
     if not kept >= set(map(int, pair)):
         return None
     (near, x), (far, beyond) = (branch.discretized(int(one)) for one in (pair if part < 0.5 else pair[::-1]))
     weight = part if part < 0.5 else 1 - part
     states = (1 - weight) * near.states(x) + weight * far.evaluate(beyond, near.nodes)
-    values = {name: float(branch.points[name][row]) for name in strip.parameters}
+    values = {name: float(branch.points[name][row]) for name in strip.parameters if name in branch.points.dtype.names} | others
     try:
         point = corrected(strip, near, states, values)
         index = point.second_variation().index()
     except ContinError:
         return None
     number = int(pair[0] if part < 0.5 else pair[1])
-    return State(f"point {number}", strip, point, index, strip.potential(point))
+    return State(f"point {number}", stage, point, index, strip.potential(point))
 
 
 def _same(one: State, other: State) -> bool:
-    t = np.linspace(0, 1, 21)
-    places = [state.point.system.evaluate(state.point.x, t)[:, 4:7] for state in (one, other)]
-    return bool(np.abs(places[0] - places[1]).max() < _SAME)
+    t, problem = np.linspace(0, 1, 21), one.point.system.problem
+    where = [at for at, name in enumerate(problem.state_names) if name.startswith(CENTRELINE)]
+    places = [state.point.system.evaluate(state.point.x, t)[:, where] for state in (one, other)]
+    return bool(np.abs(places[0] - places[1]).max() < _SAME * one.stage.scene.longest)
 
 
 def _ways(states: Sequence[State]) -> dict[str, Barrier]:
@@ -133,8 +152,9 @@ def _ways(states: Sequence[State]) -> dict[str, Barrier]:
     for saddle in states:
         if saddle.index != 1:
             continue
+        length = saddle.stage.scene.longest
         try:
-            sides = ways_down(saddle.chain, apart, KICK_OPEN)
+            sides = ways_down(saddle.chain, apart, KICK_OPEN / length, LONGEST / length)
         except ValueError:  # it cannot be cut into so few segments
             continue
         if sides is not None:
@@ -142,9 +162,12 @@ def _ways(states: Sequence[State]) -> dict[str, Barrier]:
     return barriers([(state.name, state.potential) for state in stable], found)
 
 
-def _name(end: OpenChain, stable: Sequence[State]) -> str | None:
+def _name(end: Chain, stable: Sequence[State]) -> str | None:
     """Return the name of the stable state in which a strip rests, or of one that it is an image of; None for another one."""
-    rests = [(state.name, descend(state.chain(len(end.strains))).end) for state in stable]
+    rests = []
+    for state in stable:
+        way = descend(state.chain(end.asked), longest=LONGEST / state.stage.scene.longest)
+        rests.append((state.name, way.end))
     for name, rest in rests:
         if not apart(end, rest):
             return name
@@ -152,14 +175,67 @@ def _name(end: OpenChain, stable: Sequence[State]) -> str | None:
     return next((f"an image of {name}" for name in equal), None)
 
 
+# --- snaps ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fall:
+    """What a strip does past a fold at which a stable piece ends: the row of the fold, and the released energy.
+
+    ``column`` is the number that is followed, and ``value`` the one at which the strip is let go. ``into`` is the name of the
+    state in which it comes to rest, None for one that is not in the result.
+    """
+
+    row: int
+    column: str
+    value: float
+    released: float
+    into: str | None
+
+
+def falls(branch: OpenBranch, quiet: bool = True) -> list[Fall]:
+    """Return what the strip does past each fold at which a stable piece ends, where it comes to rest."""
+    rows = [
+        int(event["point"])
+        for event in branch.events if event["label"] == b"LP" and 0 in (event["index_before"], event["index_after"])
+    ]  # fmt: skip
+    with Progress("folds", len(rows), quiet) as progress:
+        found = []
+        for row in rows:
+            progress.part(branch.followed(int(branch.points["stage"][row])))
+            found.append(_fall(branch, row))
+            progress.part_done()
+    return [fall for fall in found if fall is not None]
+
+
+def _fall(branch: OpenBranch, row: int) -> Fall | None:
+    stage = branch.stages[int(branch.points["stage"][row]) - 1]
+    if row not in branch.kept() or stage.chains.unsupported(stage.strip):
+        return None
+    column, length = stage.follow, branch.scene.longest
+    limit, before = (float(branch.points[column][at]) for at in (row, row - 1))
+    value = past(limit, 1 if before < limit else -1)
+    try:
+        chain = stage.chains.cut(stage.strip, *branch.discretized(row), SEGMENTS)
+        chain = replace(chain, numbers={**chain.numbers, column: value}).moved(np.zeros(chain.size))
+        end = at_rest(chain, KICK_OPEN / length, LONGEST / length)
+    except ValueError:  # it cannot be held past the fold, or be cut into so few segments
+        return None
+    if end is None:
+        return None
+    stable = [state for state in states_at(branch, row, value) if state.index == 0]
+    return Fall(row, column, value, chain.energy - end.energy, _name(end, stable))
+
+
 # --- in words ---------------------------------------------------------------------------------------------------------
 
 
 def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
-    """Return what a run prints of the barriers of its result: nothing without a stable state and a saddle at one place."""
-    found = places(branch, quiet)
+    """Return what a run prints of barriers, at places with a stable state and a saddle, and of folds at which strips snap."""
+    found, snaps = places(branch, quiet), falls(branch, quiet)
     factor, unit = branch.scene.factor("potential"), branch.scene.unit("potential")
-    lines = [f"to leave stable states{f', energies in {unit}' if unit else ''}:"] if found else []
+    energies_in = f", energies in {unit}" if unit else ""
+    lines = [f"to leave stable states{energies_in}:"] if found else []
     for place in found:
         energies = {state.name: state.potential for state in place.states}
         lines.append(f"  {_words(branch, place)}:")
@@ -169,12 +245,21 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
             way = place.ways.get(state.name)
             head = f"    {state.name}, energy {state.potential * factor:.6g}"
             lines.append(f"{head}: {_way(way, energies, factor)}")
+    lines += [f"past folds at which stable states end{energies_in}:"] if snaps else []
+    for fall in snaps:
+        where = _at(branch, fall.column, float(branch.points[fall.column][fall.row]), int(branch.points["stage"][fall.row]))
+        into = fall.into or "a state that is not in the result"
+        lines.append(f"  {where}, point {fall.row}: falls into {into}, which releases {fall.released * factor:.6g}")
     return lines
 
 
 def _words(branch: OpenBranch, place: Place) -> str:
-    value = exact_text(float(f"{place.value * branch.scene.factor(place.column):.6g}"))
-    return f"{place.column} = {value} {branch.scene.unit(place.column)}".rstrip() + f" of stage {place.stage}"
+    return _at(branch, place.column, place.value, place.stage)
+
+
+def _at(branch: OpenBranch, column: str, value: float, stage: int) -> str:
+    number = exact_text(float(f"{value * branch.scene.factor(column):.6g}"))
+    return f"{column} = {number} {branch.scene.unit(column)}".rstrip() + f" of stage {stage}"
 
 
 def _way(way: Barrier | None, energies: dict[str, float], factor: float) -> str:

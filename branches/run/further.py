@@ -52,7 +52,7 @@ def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
 
 def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> Place:
     stage = int(branch.points["stage"][row])
-    column, strip, mesh = branch.followed(stage), known[0].strip, branch.scene.mesh
+    column, mechanics, mesh = branch.followed(stage), known[0].stage, branch.scene.mesh
     control = MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals)
     search = Search(sizes=SIZES, draws=draws, most=MOST)
     account = further([state.point for state in known], column, search, Settings(mesh=control))
@@ -62,7 +62,7 @@ def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> P
             index = point.second_variation().index()
         except ContinError:
             index = -1
-        found.append(State("", strip, point, index, strip.potential(point)))
+        found.append(State("", mechanics, point, index, mechanics.strip.potential(point)))
     return Place(stage, column, known[0].point[column], known, sorted(found, key=lambda state: state.potential), account)
 
 

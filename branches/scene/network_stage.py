@@ -22,7 +22,7 @@ _AXES = "xyz"
 class NetworkStage(OpenStage):
     """A stage of a scene of a network."""
 
-    has_barriers, supports = False, "held"
+    supports = "held"
 
     def __init__(self, scene, number: int):
         super().__init__(scene, number)
@@ -99,6 +99,12 @@ class NetworkStage(OpenStage):
             for kind, part in zip("FM", parts):
                 found |= zip((f"{kind}_{joint}_{axis}" for axis in _AXES), map(float, part))
         return found
+
+    @property
+    def chains(self):
+        from ribbon_model import network_segments
+
+        return network_segments
 
     # --- words ----------------------------------------------------------------------------------------------------------
 

@@ -332,6 +332,13 @@ class OpenStage(Stage):
         """Return the potential and the reactions."""
         return {"potential": self.strip.potential(point), **self.strip.reactions(point)}
 
+    @property
+    def chains(self):
+        """The module that cuts states into segments, for descents: ``unsupported(strip)`` and ``cut(strip, system, x, N)``."""
+        from ribbon_model import open_segments  # most runs cut nothing
+
+        return open_segments
+
     # --- words ----------------------------------------------------------------------------------------------------------
 
     def row(self, point: Point, step: float) -> str:

@@ -340,6 +340,9 @@ class OpenScene(StagedScene):
 
     # --- the strip ----------------------------------------------------------------------------------------------------
 
+    #: Lengths are over that of the strip.
+    longest: ClassVar[float] = 1.0
+
     def factor(self, name: str) -> float:
         """Return what a number of the strip is multiplied by to have its unit."""
         if self.dimensions is None:

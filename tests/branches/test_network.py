@@ -12,10 +12,12 @@ from branches.draw.strip import reach_of, rendered
 from branches.explore.gather import gather
 from branches.export.__main__ import main as export
 from branches.read import read_branch
+from branches.run.barriers import falls, places, report
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
+from ribbon_model.descent import past
 
 ROD = "{law: rod, B1: 1.0, B2: 1.0, C: 0.75}"
 #: A cantilever in two pieces, with a load at its tip.
@@ -295,6 +297,57 @@ def test_reactions_that_no_load_replaces_are_told(tmp_path):
     path = tmp_path / "result.h5"
     assert run_scene(parse(text, "scene.yaml"), path, Display(silent=True)) == "lost"
     assert read_branch(path).stop.startswith("stage 2: held: the supports let go of what no load replaces")
+
+
+# --- barriers and snaps -------------------------------------------------------------------------------------------------
+
+COLUMN = """
+material: {law: rod, B1: 1.0, B2: 20.0, C: 15.0}
+strips:
+  a: {begin: [0, 0, 0], end: [0, 0, 0.4], normal: [0, 1, 0]}
+  b: {after: a, length: 0.6}
+joints: {A: [a start], cut: [a finish, b start], B: [b finish]}
+held: {A: clamped, B: {slides_along: [0, 0, 1]}}
+loads: {P: {B: [0, 0, -1]}}
+stages:
+  - {follow: P, to: 90}
+  - {follow: P, to: 86, start_at: BP 1, stage: 1, label: {P: [85]}}
+  - {follow: P, to: 86, start_at: BP 2, stage: 1, label: {P: [85]}}
+"""
+
+
+def test_the_barrier_of_a_buckled_column(run):
+    """From one side to the other over the second mode: the difference of two potentials that the run has located."""
+    branch = run(COLUMN)
+    stable, saddle = branch.events[branch.events["label"] == b"UZ"]
+    assert (stable["index"], saddle["index"]) == (0, 1)
+    (place,) = places(branch)
+    ((name, way),) = place.ways.items()
+    assert name == f"point {stable['point']}"
+    assert way.behind == f"an image of {name}"
+    assert way.height == pytest.approx(saddle["potential"] - stable["potential"], abs=1e-8)
+    assert report(branch)[0] == "to leave stable states:"
+
+
+def test_the_snap_of_an_arch(run, root):
+    """Past its fold it falls to the other side: the energy is that of an arch that is drawn there, without the segments."""
+    branch = run("network_arch")
+    (fall,) = falls(branch)
+    assert fall.into is None
+    assert fall.value == pytest.approx(branch.points["P"][fall.row] + past(0, 1) * (1 + branch.points["P"][fall.row]))
+    before = branch.points[fall.row]
+    start = before["potential"] + (fall.value - before["P"]) * before["arch_at_0_45_y"]  # to first order
+    text = (root / "configs" / "network_arch.yaml").read_text()
+    text = text.replace("[0, 0.3894", "[0, -0.3894").replace("bend: 0.8", "bend: -0.8").replace(
+        "to: 60.0, limits: {P: [-60, 60]}", f"to: {fall.value!r}"
+    )  # fmt: skip
+    below = run(text).points[-1]
+    assert below["index"] == 0
+    assert fall.released == pytest.approx(start - below["potential"], abs=5e-4)
+    line = report(branch)[-1]
+    assert re.fullmatch(
+        r"  P = 14\.1498 of stage 1, point 17: falls into a state that is not in the result, which releases 1\.762\d*", line
+    )
 
 
 # --- joints, as pictures show them --------------------------------------------------------------------------------------
