@@ -55,7 +55,7 @@ from contin.core.protocol import Discretization
 from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
 from contin.core.state import State
-from contin.core.step import aims
+from contin.core.step import SUMS, aims
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
@@ -135,7 +135,7 @@ class Lane(ABC):
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         newton, (angle, accuracy) = settings.newton, aims(settings, system)
         self._frame = Frame(system.weights, system.state_size, system.free_scales)
-        self._attempt = Attempt(np.empty(system.size), np.empty(6), np.zeros(JUDGED))
+        self._attempt = Attempt(np.empty(system.size), np.empty(SUMS), np.zeros(JUDGED))
         self._control = Control(
             newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step,
             primary,

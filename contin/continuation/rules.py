@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from contin.core.small import ASKS, BELIEVED, FAILED
-from contin.core.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, turned, up_to
+from contin.core.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, missed_of, turned, up_to
 from contin.events.folds import dips, ends_low
 from contin.events.inspection import FEWEST, REACH, misses
 from contin.events.significance import STANDS
@@ -102,7 +102,7 @@ def judge(frame: Frame, attempt: Attempt, control: Control, path: Path, number: 
     x, tangent, earlier = path.x[number - 1], path.tangents[number - 1], path.tangents[number - 2]
     new, new_tangent, sums, judged = path.x[number], path.tangents[number], attempt.sums, attempt.judged
     fill_sums_of(x, tangent, new, new_tangent, attempt.guess, frame.weights, frame.states, sums)
-    judged[MISSED], judged[LENGTH] = math.sqrt(sums[0]), math.sqrt(sums[5])
+    judged[MISSED], judged[LENGTH] = missed_of(sums[0], sums[6], sums[3], sums[4]), math.sqrt(sums[5])
     judged[TURN] = turned(sums[1], sums[2], sums[3], sums[4])
     if not (judged[TURN] <= control.angle and judged[MISSED] <= ASTRAY * control.accuracy * step):
         return FAILED

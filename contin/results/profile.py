@@ -7,8 +7,12 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.names import exact_text
 from contin.problems.statement import declared
 from contin.results.record import Record, over_t
+
+#: Part of a segment by which a coordinate may lie outside: ends are sums of lengths, with their round-off.
+_ROUND_OFF = 1e-9
 
 
 class Profile:
@@ -51,7 +55,18 @@ class Profile:
         return column
 
     def __call__(self, s: Array) -> Array:
-        """Return the states at coordinates (m,) between the ends of the segment, shape (m, n)."""
-        t = (np.atleast_1d(np.asarray(s, dtype=float)) - self.begin) / (self.end - self.begin)
+        """Return the states at coordinates (m,) between the ends of the segment, shape (m, n).
+
+        Raises
+        ------
+        ProblemError
+            A coordinate outside the segment.
+        """
+        places = np.atleast_1d(np.asarray(s, dtype=float))
+        t = (places - self.begin) / (self.end - self.begin)
+        outside = ~((t >= -_ROUND_OFF) & (t <= 1 + _ROUND_OFF))
+        if outside.any():
+            ends = f"{exact_text(self.begin)} to {exact_text(self.end)}"
+            raise ProblemError(f"s: {exact_text(float(places[outside][0]))} must lie on the segment, from {ends}")
         states: Array = self._system.evaluate(self._x, t)[:, self._at]
         return states

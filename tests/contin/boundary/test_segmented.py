@@ -156,3 +156,13 @@ def test_refusals():
         solve(cut_bratu(), [[0, 0], [0, 0, 0]])
     with pytest.raises(ProblemError, match="segment: 2 must be a whole number from 0 to 1"):
         solve(cut_bratu(), [0, 0, 0, 0]).segment(2)
+
+
+def test_no_coordinate_outside_a_segment():
+    line = Segment(lambda s, u, p: (p.slope,), ["u"], length=0.3)
+    problem = SegmentedProblem([line, line], lambda a, b, p: (a[0].u, a[1].u - b[0].u), {"slope": 2.0})
+    second = solve(problem, [[0.0], [0.0]]).segment(1)
+    assert second([0.3, 0.6]) == pytest.approx(np.array([[0.6], [1.2]]))
+    for place in (0.2, 0.7, float("nan")):
+        with pytest.raises(ProblemError, match=f"s: {place:g} must lie on the segment, from 0.3 to 0.6"):
+            second([0.4, place])
