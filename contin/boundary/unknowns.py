@@ -15,7 +15,7 @@ from contin.arrays import Array, Places
 from contin.collocation.assembly import Tables, at_points, fill_phase_row
 from contin.collocation.basis import basis, interpolation
 from contin.core.protocol import Carrier, Discretization
-from contin.core.scales import Scales, usual
+from contin.core.scales import Scales, largest_entries, usual
 from contin.core.system import System
 from contin.errors import ProblemError
 from contin.problems.statement import Statement
@@ -181,7 +181,7 @@ class OnMesh(System):
         rows = {name: np.ones(count) for name, count in self._rows}
         scaled = self._with(scales=Scales(states, parameters, rows))
         z = self.carrier(scaled)(x)
-        found = {name: usual(sizes) for name, sizes in scaled._row_sizes(z).items()}
+        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
         return self._with(scales=Scales(states, parameters, found)), z
 
     def without_scales(self, x: Array) -> tuple[Self, Array]:

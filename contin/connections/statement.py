@@ -82,6 +82,7 @@ class ConnectionProblem(BoundaryValueProblem):
     homoclinic: bool
     angles: Mapping[str, float]
     saddle_node: bool
+    own_time = TIME
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *, unstable: int,
@@ -133,6 +134,11 @@ class ConnectionProblem(BoundaryValueProblem):
         """Names of the parameters that are free on every curve: the coordinates of the equilibria."""
         kinds = ("from_",) if self.homoclinic else ("from_", "to_")
         return tuple(kind + name for kind in kinds for name in self.state_names)
+
+    @property
+    def ends(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the same, of those where an orbit begins first."""
+        return self.multipliers
 
     @property
     def alike(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ problem. Scales are powers of two: multiplication by them is exact.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,10 @@ from contin.arrays import Array
 #: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
 #: numbers, and small ones less.
 USUAL = 1e-2, 1e3
+
+#: The largest entries of rows are looked at beside a point, too, by this part of 1 + |x|, in sizes. At a branch point all those
+#: of a row may be zero but for round-off: with rows of 1e-29 a branch of the equation of Kuramoto and Sivashinsky ended.
+_ASIDE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +55,15 @@ class Scales:
 def nothing_scaled(states: int, parameters: int, rows: tuple[tuple[str, int], ...]) -> Scales:
     """Return sizes that are all one; ``rows`` are names and numbers of equations."""
     return Scales(np.ones(states), np.ones(parameters), {name: np.ones(count) for name, count in rows})
+
+
+def largest_entries(entries: Callable[[Array], Array], x: Array) -> Array:
+    """Return the larger of ``entries(x)`` and of those beside x, where these are finite."""
+    here = entries(x)
+    with np.errstate(all="ignore"):
+        beside = entries(x + _ASIDE * (1 + np.abs(x)))
+    larger: Array = np.maximum(here, np.where(np.isfinite(beside), beside, 0.0))
+    return larger
 
 
 def usual(sizes: Array | float) -> Array:

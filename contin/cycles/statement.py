@@ -155,6 +155,11 @@ class CycleProblem(BoundaryValueProblem):
         if periods:
             check_periodic("field", self.batch("field"), periods, self.parameters)
 
+    @property
+    def own_time(self) -> str:  # type: ignore[override]
+        """The period, of an autonomous field."""
+        return PERIOD if self.period is None else ""
+
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         states, own = self.state_names, (PERIOD, ROUNDS, *winding_names(self.angles))

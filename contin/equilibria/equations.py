@@ -14,7 +14,7 @@ from contin.core.differences import derivative
 from contin.core.multilinear import of_lines
 from contin.core.protocol import Carrier, Discretization
 from contin.core.rounding import may_be_on_axis, off_axis
-from contin.core.scales import Scales, usual
+from contin.core.scales import Scales, largest_entries, usual
 from contin.core.spectral import Spectral
 from contin.core.system import System
 from contin.equilibria.given import check_given
@@ -326,9 +326,13 @@ class AlgebraicEquations(Spectral, System):
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
         z = self.carrier(scaled)(x)
-        jacobian = abs(scaled._jacobian(z)[1])
-        largest = jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
-        rows = usual(largest)
+
+        def entries(at: Array) -> Array:
+            jacobian = abs(scaled._jacobian(at)[1])
+            found: Array = jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
+            return found
+
+        rows = usual(largest_entries(entries, z))
         return self._with(scales=Scales(states, parameters, {"residual": rows})), z
 
     def without_scales(self, x: Array) -> tuple[AlgebraicEquations, Array]:

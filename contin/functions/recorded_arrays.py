@@ -22,6 +22,8 @@ from contin.functions.recorded_complex import ComplexNumber, complex_number, fun
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Tape, Unrecordable, power
 
+#: Largest matrix of recorded numbers that is inverted: masses of two or three bodies. Cofactors of four rows are 40 terms.
+_LARGEST_INVERSE = 3
 #: Operands of operations. Arrays of objects may hold complex numbers as well.
 Scalar = Number | float
 #: A recorded number of any kind.
@@ -366,6 +368,43 @@ def _norm(x: object, ord: object = None, axis: object = None, keepdims: bool = F
     return operation("sqrt")(scalar_product(listed, listed))
 
 
+def _determinant(matrix: object) -> Any:
+    rows = _square(matrix, "det")
+    if len(rows) == 1:
+        return rows[0][0]
+    minors = ([row[:j] + row[j + 1 :] for row in rows[1:]] for j in range(len(rows)))
+    return sum((-1) ** j * rows[0][j] * _determinant(minor) for j, minor in enumerate(minors))
+
+
+def _inverse(matrix: object) -> Any:
+    rows = _square(matrix, "inv")
+    if recorded(rows) is None:
+        return np.linalg.inv(np.array(rows, dtype=float))
+    count, by = len(rows), 1.0 / _determinant(rows)
+    found = [[by for _ in rows] for _ in rows]
+    for i, j in itertools.product(range(count), range(count)):
+        minor = [row[:j] + row[j + 1 :] for k, row in enumerate(rows) if k != i]
+        found[j][i] = (-1) ** (i + j) * (_determinant(minor) if minor else 1.0) * by
+    return numbers(found)
+
+
+def _square(matrix: object, name: str) -> list[list[Any]]:
+    """Return the rows of a matrix; one of recorded numbers has three at most: the terms of larger determinants cancel."""
+    given = _plain(matrix)
+    if given.ndim != 2 or given.shape[0] != given.shape[1]:
+        raise ValueError(f"np.linalg.{name} of an array of shape {given.shape}")
+    if recorded(given) is not None and len(given) > _LARGEST_INVERSE:
+        raise Unrecordable(
+            f"it calls np.linalg.{name} or np.linalg.solve for a matrix of more than {_LARGEST_INVERSE} rows that varies"
+        )
+    rows: list[list[Any]] = given.tolist()
+    return rows
+
+
+def _solved(a: object, b: object) -> Any:
+    return matrix_product(_inverse(a), b)
+
+
 def _interp(x: object, xp: Any, fp: Any, left: float | None = None, right: float | None = None, period: None = None) -> Any:
     if period is not None or recorded(xp, fp) is not None:
         raise Unrecordable("np.interp has a period, or knots that are no constants")
@@ -414,7 +453,8 @@ def _like(value: float) -> Callable[..., Any]:
 
 #: Functions of NumPy that are not universal, and are written for recorded numbers here.
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.where: _where, np.linalg.norm: _norm, np.interp: _interp, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
+    np.where: _where, np.linalg.norm: _norm, np.linalg.det: _determinant, np.linalg.inv: _inverse, np.linalg.solve: _solved,
+    np.interp: _interp, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
     np.vdot: lambda a, b: scalar_product(_plain(_parts("conjugate")(a)).ravel().tolist(), _plain(b).ravel().tolist()),
     np.inner: matrix_product, np.polyval: _polyval, np.zeros_like: _like(0.0), np.ones_like: _like(1.0),
     np.empty_like: _like(0.0), np.full_like: _like(0.0),

@@ -77,6 +77,10 @@ class Restated:
     dynamics = False
     #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
     spare: str | None = None
+    #: The parameter that is the length in time of an orbit, "" where that is given; None where solutions are no orbits.
+    own_time: str | None = None
+    #: Parameters that are the states where an orbit begins, then those where it ends.
+    ends: tuple[str, ...] = ()
     #: Functionals that are states which follow from others: their largest and smallest values over a cycle are columns, too.
     following: tuple[str, ...] = ()
     #: A singular mass matrix.

@@ -10,7 +10,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Function, Named
 from contin.errors import ProblemError
-from contin.functions.signature import Signature, argument_count, result_count, takes_arrays
+from contin.functions.signature import Signature, argument_count, named_values, result_count, takes_arrays
 
 
 def returning(field: Function, signature: Signature) -> Function:
@@ -29,6 +29,12 @@ def returning(field: Function, signature: Signature) -> Function:
         def rates(times: tuple[float, ...], u: Named, p: Named) -> Any:
             return field(*times, np.array(list(u)), p)
 
+    elif counted == wanted and _unpacks(field, signature):
+        own, known = named_values(signature.parameters), len(signature.parameters)
+
+        def rates(times: tuple[float, ...], u: Named, p: Named) -> Any:
+            return field(*times, u, own(*list(p)[:known]))
+
     else:
         return field
     returned: Function = (lambda t, u, p: rates((t,), u, p)) if signature.times else (lambda u, p: rates((), u, p))
@@ -37,6 +43,20 @@ def returning(field: Function, signature: Signature) -> Function:
     except ProblemError:
         return field  # one of (t, u, p) in place of (u, p, out): `check_field` says so
     return returned
+
+
+def _unpacks(field: Function, signature: Signature) -> bool:
+    """Return whether a field takes its own parameters only, as `a, b = p` does, and not those that a kind of problem adds."""
+    more = Signature(signature.states, (*signature.parameters, "one_more_"), times=signature.times)
+    try:
+        result_count(field, signature.arguments, "field")
+    except ProblemError:
+        return False
+    try:
+        result_count(field, more.arguments, "field")
+    except ProblemError:
+        return True
+    return False
 
 
 def check_field(field: Function, signature: Signature, wrong: str) -> None:

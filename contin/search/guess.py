@@ -44,7 +44,25 @@ def restated(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[
 
     These are states without rates, and those that follow from conserved totals.
     """
+    guess, parameters = _over_own_time(problem, guess, parameters)
     return _on_totals(*_with_rates(problem, guess, parameters))
+
+
+def _over_own_time(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Guess, dict[str, float]]:
+    """Return arrays (t, states) of an orbit over [0, 1], with what they say of its time and of the equilibria at its ends."""
+    if problem.own_time is None or not _is_pair(guess):
+        return guess, parameters
+    t, states = _numbers(guess[0]), _numbers(guess[1])
+    if t.size < 2 or states.size != t.size * len(problem.state_names):
+        return guess, parameters  # said of the guess as it is
+    begin, time = t[0], t[-1] - t[0]
+    ends = states.reshape(t.size, -1)[[0, -1]].ravel().tolist()
+    found = dict(zip(problem.ends, ends))
+    if abs(begin) <= _SLACK and abs(time - 1) <= _SLACK:
+        return guess, {**found, **parameters}
+    if problem.own_time:
+        found[problem.own_time] = float(time)
+    return ((t - begin) / (time or 1.0), states), {**found, **parameters}
 
 
 def _with_rates(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
