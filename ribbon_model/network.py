@@ -58,6 +58,8 @@ ASSEMBLY = "assembly"
 MOVES = ("dx", "dy", "dz")
 #: Numbers of loads that act all along.
 POTENTIALS = ("weight", "pressure", "field")
+#: The same of a load without an energy: a pressure that stays normal to strips.
+FOLLOWER = "follower_pressure"
 #: A quaternion, scalar first.
 Quaternion = tuple[float, float, float, float]
 
@@ -230,7 +232,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Load:
-    """Dead forces and moments with one number.
+    """Forces and moments with one number.
 
     Attributes
     ----------
@@ -239,10 +241,13 @@ class Load:
         member of the joint.
     moments : sequence of (joint, factor)
         The moment about the axis of a hinge that holds a joint is the number times the factor.
+    followers : sequence of (joint, direction, arm)
+        Forces that turn with the first member of the joint. They have no energy, so states under them have no index.
     """
 
     forces: Sequence[tuple[str, Vector, Vector]] = ()
     moments: Sequence[tuple[str, float]] = ()
+    followers: Sequence[tuple[str, Vector, Vector]] = ()
 
 
 @dataclass
@@ -267,7 +272,8 @@ class Network:
         length; ``pressure``: per length of a strip that bends in a plane; ``field``: couple per length.
     weight_direction, pressure_normal, field_direction : tuple of float
         Where the weight pulls to; the normal of the plane in which members go around an area, counterclockwise, on which the
-        pressure acts from outside; the direction of a uniform field.
+        pressure acts from outside; the direction of a uniform field. ``follower_pressure``: per length, against the normal of
+        each strip, wherever it points to; without an energy.
     magnetized : int
         The number (0, 1, 2) of the director along which strips are magnetized.
     phases : sequence of Phase
@@ -329,7 +335,7 @@ class Network:
         for name in self.held:
             _known("held", name, self.joints)
         for number, load in self.loads.items():
-            for joint_name, *_ in load.forces:
+            for joint_name, *_ in (*load.forces, *load.followers):
                 _known(f"loads: {number}: joint", joint_name, self.joints)
             for joint_name, _ in load.moments:
                 if joint_name not in self.held or self.held[joint_name].rotation != HINGED:
@@ -340,6 +346,8 @@ class Network:
             if "weight" in self.numbers:
                 raise ValueError("weight: nothing is held, so nothing bears it; hold a joint")
             for number, load in self.loads.items():
+                if load.followers:
+                    raise ValueError(f"loads: {number}: nothing is held, so nothing bears forces that follow; hold a joint")
                 total = np.sum([direction for _, direction, _ in load.forces], axis=0)
                 if np.linalg.norm(total) > LOOSE:
                     raise ValueError(f"loads: {number}: nothing is held, so its forces must add up to zero; hold a joint")
@@ -355,7 +363,7 @@ class Network:
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the sections."""
         angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
-        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *POTENTIALS)
+        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *POTENTIALS, FOLLOWER)
 
     @property
     def _prescribed(self) -> tuple[str, ...]:
@@ -369,8 +377,8 @@ class Network:
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        potentials = [name for name in POTENTIALS if name in self.numbers]
-        always = [name for name in self.known if name not in POTENTIALS]
+        potentials = [name for name in (*POTENTIALS, FOLLOWER) if name in self.numbers]
+        always = [name for name in self.known if name not in (*POTENTIALS, FOLLOWER)]
         values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
         own = {
             self._full(name, number): value
@@ -420,10 +428,11 @@ class Network:
             if key not in densities:
                 densities[key] = self._hamiltonian(member, place)
             states = (*FRAME, *CENTRELINE, *phases)
-            segments.append(VariationalSegment(None, states, member.length, hamiltonian=densities[key]))
+            work = _following_pressure if FOLLOWER in self.numbers else None
+            segments.append(VariationalSegment(None, states, member.length, hamiltonian=densities[key], work=work))
         return SegmentedVariationalProblem(
             segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
-            phases=self._named(phases),
+            phases=self._named(phases), end_work=self._end_work(),
         )  # fmt: skip
 
     def _named(self, states: Sequence[str]) -> list[str]:
@@ -602,6 +611,28 @@ class Network:
 
         return potential
 
+    def _end_work(self) -> Callable | None:
+        """Return the work of forces that follow, on other states; None without one."""
+        loaded = [(number, *one) for number, load in self.loads.items() for one in load.followers]
+        if not loaded:
+            return None
+        found = []
+        for number, name, direction, arm in loaded:
+            first = self.joints[name].members[0]
+            own = tuple(_numbers(np.array(directors(*self._drawn(first)[:4])).reshape(3, 3) @ v) for v in (direction, arm))
+            place, end = list(self.members).index(first.member), 0 if first.end == START else 1
+            found.append((number, place, end, own[0], tuple(x + y for x, y in zip(first.arm, own[1]))))
+
+        def work(a, b, y_a, y_b, p):
+            value = 0.0
+            for number, place, end, along, arm in found:
+                here, moved = ((states[end][place]) for states in ((a, b), (y_a, y_b)))
+                force = [x - y for x, y in zip(_moved(here, along), here[4:7])]
+                value = value + p.assembly * getattr(p, number) * sum(x * y for x, y in zip(force, _moved(moved, arm)))
+            return value
+
+        return work
+
     # --- first states -------------------------------------------------------------------------------------------------
 
     def guess(self) -> list[Callable]:
@@ -720,7 +751,9 @@ class Network:
         return away
 
     def _determined(self, point: Point) -> Point:
-        """Return a state; raise ProblemError where something can move without a change of energy."""
+        """Return a state; raise ProblemError where something can move without a change of energy, if loads have one."""
+        if not self.problem.has_index:
+            return point
         sizes = np.abs(point.second_variation().eigenvalues)
         if sizes.size and not sizes.min() > _ZERO * sizes.max():
             raise ProblemError(MECHANISM)
@@ -746,7 +779,7 @@ class Network:
         own = set(self._of_sections)
         found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": force}
         found |= dict.fromkeys([name for name in self._prescribed if name.endswith(MOVES)], length)
-        found |= dict.fromkeys([name for name in (*self.loads, *POTENTIALS) if name in found], force)
+        found |= dict.fromkeys([name for name in (*self.loads, *POTENTIALS, FOLLOWER) if name in found], force)
         for number in range(len(self.members)):
             behind = f"_{number}" if len(self.members) > 1 else ""
             phases = [f"phase_{number}" for number in range(len(self.phases))]
@@ -819,7 +852,8 @@ class Network:
             joint = self.joints[name]
             force, moment = self._on_ends(point, joint.members, self.place(point, name))
             for number, load in self.loads.items():
-                for where, direction, arm in load.forces:
+                turned = [(where, self._arm(point, joint.members[0], along), arm) for where, along, arm in load.followers]
+                for where, direction, arm in (*load.forces, *turned):
                     if where == name:
                         pull = point[ASSEMBLY] * point[number] * np.array(direction)
                         force, moment = force - pull, moment - np.cross(self._arm(point, joint.members[0], arm), pull)
@@ -879,6 +913,11 @@ class Network:
         states, rows = point.system.states(point.x), namedtuple("State", (*FRAME, *CENTRELINE))
         first, last = ([rows(*states[end, places[:7]]) for places in self.places] for end in (0, -1))
         return point["energy"] + float(self._end_energy(first, last, SimpleNamespace(**point.parameters)))
+
+
+def _following_pressure(s, x, y, p):
+    """Return the work of a pressure against the normal d2 of a strip at x, on another state."""
+    return -p.assembly * p.follower_pressure * sum(d * r for d, r in zip(directors(*x[:4])[3:6], y[4:7]))
 
 
 def _known(what: str, name: str, names: Mapping) -> None:

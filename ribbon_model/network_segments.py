@@ -465,6 +465,8 @@ def unsupported(network: Network) -> str:
             return f"a network with {name}"
     if any(end.rotation == JOINT for end in network.held.values()):
         return "a network with a universal joint"
+    if not network.problem.has_index:
+        return "a network with loads that follow"
     if network.floats and network.loads:
         return "a network with loads that nothing holds"
     return ""

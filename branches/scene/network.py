@@ -21,6 +21,7 @@ from ribbon_model.ends import DIRECTIONS, FREE_END, End
 from ribbon_model.network import (
     BALL,
     FINISH,
+    FOLLOWER,
     HINGE,
     POTENTIALS,
     RIGID,
@@ -115,12 +116,15 @@ class ForceConfig(Strict):
 
     force: Vector | None = Field(None, description="direction and size of the force, for a number of 1")
     arm: Vector = Field((0.0, 0.0, 0.0), description="from the joint to where it acts, on the axes of the drawing")
+    follows: bool = Field(False, description="the force turns with the first strip of the joint: no energy, and no index")
     moment: float | None = Field(None, description="size of the moment about the axis of the hinge, for a number of 1")
 
     @model_validator(mode="after")
     def _fits(self):
         if (self.force is None) == (self.moment is None):
             raise ValueError("force, moment: give one of them")
+        if self.follows and self.force is None:
+            raise ValueError("follows: a moment that follows is not there; give a force")
         return self
 
 
@@ -267,7 +271,7 @@ class NetworkScene(StagedScene):
                 raise ValueError(f"held: {name!r} must be one of {', '.join(joints)}")
         loads |= {number: load for name in changed for number, load in replacing(name, held.get(name)).items()}
         told = {name for stage in self.stages for name in (stage.follow, *stage.numbers)}
-        numbers = dict.fromkeys((name for name in POTENTIALS if name in told), 0.0) | self.numbers
+        numbers = dict.fromkeys((name for name in (*POTENTIALS, FOLLOWER) if name in told), 0.0) | self.numbers
         where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
         directions = where.weight, where.pressure, where.field, first
         if changed:  # a support that is let go has no numbers
@@ -315,7 +319,7 @@ class NetworkScene(StagedScene):
 
     def _load(self, number: str, actions: dict[str, ForceConfig], joints: dict[str, Joint], cuts, pieces) -> Load:
         """Return a load; a place along a strip that is no joint becomes one."""
-        forces, moments = [], []
+        forces, moments, followers = [], [], []
         for place, action in actions.items():
             name = place
             if place not in self.joints:
@@ -323,10 +327,10 @@ class NetworkScene(StagedScene):
                 name = re.sub(r"\W+", "_", place)
                 joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end, _ in ends]))
             if action.force is not None:
-                forces.append((name, action.force, action.arm))
+                (followers if action.follows else forces).append((name, action.force, action.arm))
             else:
                 moments.append((name, action.moment))
-        return Load(forces, moments)
+        return Load(forces, moments, followers)
 
     @functools.cached_property
     def longest(self) -> float:

@@ -65,6 +65,8 @@ class NetworkStage(OpenStage):
 
     def notes(self, run: Continuation) -> list[str]:
         notes = super().notes(run)
+        if self.number == 1 and not self.problem.has_index:
+            notes.insert(0, "loads that follow the strips have no energy: there is no index, and flutter is not looked for")
         if self._how:
             notes.insert(0, f"stage {self.number}: the first state was found {self._how}")
         return notes
@@ -114,8 +116,8 @@ class NetworkStage(OpenStage):
 
     def felt(self, name: str) -> str:
         network = self.strip
-        if name in network.loads and network.loads[name].forces:
-            joint, direction, _ = network.loads[name].forces[0]
+        if forces := [*network.loads[name].forces, *network.loads[name].followers] if name in network.loads else ():
+            joint, direction, _ = forces[0]
             return f"{joint}_{_AXES[int(np.argmax(np.abs(direction)))]}"
         joint, _, move = name.rpartition("_")
         if move in MOVES and joint in network.held:

@@ -7,6 +7,9 @@ With the Hamiltonian H = lambda.f - L - mu.g at the controls w that maximize it,
 and at the ends lambda(t0) = d(Phi + sigma.e)/dx(t0), lambda(t1) = -d(Phi + sigma.e)/dx(t1). Where H is quadratic in w, the
 controls are eliminated on the tape; else they are found at each point as the minimum of -H, with exact derivatives
 (`contin.functions.iteration`).
+
+Loads without an energy, as they are at the states x, do the work W(x; y) on states y. With Q the derivative of W by y at y = x,
+lambda' is less by Q, lambda(t0) less by Q0, and lambda(t1) more by Q1.
 """
 
 from __future__ import annotations
@@ -50,6 +53,8 @@ class Variation:
     controls: tuple[str, ...]
     parameters: tuple[str, ...]
     starts: tuple[float, ...]
+    work: Function | None = None
+    end_work: Function | None = None
 
     __repr__ = shown
 
@@ -135,6 +140,24 @@ def _derivatives(tape: Tape, values: Sequence[Number], by: Sequence[Number]) -> 
     return [[Number(tape, places.get((i, j), zero)) for j in range(len(by))] for i in range(len(values))]
 
 
+def _pulls(
+    tape: Tape,
+    what: str,
+    work: Function,
+    before: list[Any],
+    states: Sequence[tuple[tuple[str, ...], list[Number]]],
+    rest: list[Any],
+) -> list[Number]:
+    """Return the derivatives by y, at y = x, of the work that loads at states x do on states y."""
+    moved = [[tape.input((what, number, i)) for i in range(len(x))] for number, (_, x) in enumerate(states)]
+    at, on = ([_named(names, values) for (names, _), values in zip(states, both)] for both in ([x for _, x in states], moved))
+    values = _called(tape, what, work, [*before, *at, *on, *rest], 1)
+    x, y = ([value for group in both for value in group] for both in ([x for _, x in states], moved))
+    (slopes,) = _derivatives(tape, values, y)
+    places = tape.substitute([slope.place for slope in slopes], {old.place: new.place for old, new in zip(y, x)})
+    return [Number(tape, place) for place in places]
+
+
 class _Inside:
     """Equations between the ends: operations on one tape, whose inputs are t, x, lambda and all parameters."""
 
@@ -152,7 +175,12 @@ class _Inside:
         self.w = [tape.input(("control", i)) for i in range(len(v.controls))]
         self.pivots: list[Number] = []
         self.load: list[Number] = []
+        self.forces: list[Number] = []
         self._from_hamiltonian() if v.hamiltonian is not None else self._from_energy()
+        if v.work is not None:
+            given = [_named(v.parameters, self.p[: len(v.parameters)])]
+            pulls = _pulls(tape, "work", v.work, [self.t], [(v.states, self.x)], given)
+            self.forces = [force - pull for force, pull in zip(self.forces, pulls)]
 
     # --- H and the controls --------------------------------------------------------------------------------------
 
@@ -335,6 +363,9 @@ class EndConditions:
         self.p += sigma
         potential = sum((s * condition for s, condition in zip(sigma, free)), energy[0] if energy else tape.number(0.0))
         (by,) = _derivatives(tape, [potential], self.places)
+        if v.end_work is not None:
+            pulls = _pulls(tape, "end_work", v.end_work, [], [(v.states, self.a[:n]), (v.states, self.b[:n])], given[2:])
+            by = [slope - pull for slope, pull in zip(by, pulls)]
         starting, ending = self.a[n:], self.b[n:]
         self.values = [*self.conditions]
         self.values += [starting[i] - by[i] for i in range(n) if i not in fixed[0]]

@@ -38,7 +38,7 @@ class VariationalSegment:
         A positive number, the name of a parameter, or ``length(p)``.
     begin : float, str or callable, optional
         The coordinate s at which it begins, likewise.
-    kinematics, controls, functionals, hamiltonian, starts : optional
+    kinematics, controls, functionals, hamiltonian, starts, work : optional
         As in `contin.VariationalProblem`.
 
     Examples
@@ -59,13 +59,14 @@ class VariationalSegment:
     functionals: Mapping[str, Function] = field(default_factory=dict)
     hamiltonian: Function | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
+    work: Function | None = None
 
     __repr__ = shown
 
     @property
     def stated(self) -> dict[str, Any]:
         """What its equations follow from, as arguments of `VariationalProblem`."""
-        names = ("energy", "states", "kinematics", "controls", "functionals", "hamiltonian", "starts")
+        names = ("energy", "states", "kinematics", "controls", "functionals", "hamiltonian", "starts", "work")
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -80,7 +81,7 @@ class VariationalSegment:
         inside: Arguments = [None, states, states if self.controls is None else tuple(self.controls), parameters]
         return {
             "energy": inside, "kinematics": inside, "functionals": inside, "length": [parameters], "begin": [parameters],
-            "hamiltonian": [None, states, states, parameters],
+            "hamiltonian": [None, states, states, parameters], "work": [None, states, states, parameters],
         }  # fmt: skip
 
     def portable(self, parameters: tuple[str, ...], known: dict[Any, Any]) -> VariationalSegment:
@@ -121,6 +122,9 @@ class SegmentedVariationalProblem(VariationalProblem):
         Maps of all states, side by side, that leave the energy unchanged; see `VariationalProblem`.
     phases : sequence of str, optional
         Names of states whose multipliers vanish by symmetry; see `VariationalProblem`.
+    end_work : callable, optional
+        ``end_work(a, b, y_a, y_b, p)``: of loads without an energy, the work that they do on other states; see
+        `VariationalProblem`.
     sizes : mapping of str to float, optional
         Of all states and multipliers, and of parameters; see `VariationalProblem`.
 
@@ -157,7 +161,7 @@ class SegmentedVariationalProblem(VariationalProblem):
     def __init__(
         self, segments: Sequence[VariationalSegment], parameters: Mapping[str, float], *, ends: Function | None = None,
         end_energy: Function | None = None, symmetries: Mapping[str, Symmetry] | None = None, phases: Sequence[str] = (),
-        sizes: Mapping[str, float] | None = None,
+        sizes: Mapping[str, float] | None = None, end_work: Function | None = None,
     ) -> None:  # fmt: skip
         given = tuple(checks.sequence("segments", segments, "VariationalSegment"))
         if not given:
@@ -166,12 +170,13 @@ class SegmentedVariationalProblem(VariationalProblem):
         names = joint_names([each.states for each in given])
         check_statement(names, parameters, {})
         pieces, count = _pieces(given, parameters), len(parameters)
-        for what, function in (("ends", ends), ("end_energy", end_energy)):
-            if function is not None and argument_count(checks.function(what, function)) != 3:
-                raise ProblemError(f"{what} must take 3 arguments, (a, b, p)")
+        for what, function, arguments in (("ends", ends, 3), ("end_energy", end_energy, 3), ("end_work", end_work, 5)):
+            if function is not None and argument_count(checks.function(what, function)) != arguments:
+                raise ProblemError(f"{what} must take {arguments} arguments, (a, b, {'y_a, y_b, ' * (arguments == 5)}p)")
         variation = Variation(
             None, None, ends and between(ends, pieces), end_energy and between(end_energy, pieces), None, {}, {}, names,
             joint_names([each.variation.controls for each in own]), tuple(parameters), (),
+            next((each.work for each in given if each.work), None), end_work and _between_both(end_work, pieces),
         )  # fmt: skip
         at_ends = EndConditions(variation)
         with_multipliers = [each.with_multipliers(len(names)) for each in pieces]
@@ -190,6 +195,7 @@ class SegmentedVariationalProblem(VariationalProblem):
         """Return the arguments of the functions."""
         states, parameters = [tuple(segment.states) for segment in self.segments], self.variation.parameters
         found: dict[str, Any] = dict.fromkeys(("ends", "end_energy"), [states, states, parameters])
+        found["end_work"] = [*[states] * 4, parameters]
         for i, segment in enumerate(self.segments):
             found |= {f"{name} {i}": arguments for name, arguments in segment.signatures(parameters).items()}
         return found
@@ -214,6 +220,11 @@ class SegmentedVariationalProblem(VariationalProblem):
             Another number of them.
         """
         return joined_guess(guess, self.pieces, [len(segment.states) for segment in self.segments], parameters)
+
+
+def _between_both(function: Function, pieces: Sequence[Piece]) -> Function:
+    """Return ``function(a, b, y_a, y_b, p)`` of the states of the segments as a function of all states."""
+    return lambda *given: function(*(tuple(piece.of(states) for piece in pieces) for states in given[:4]), given[4])
 
 
 def _statements(segments: Sequence[VariationalSegment], parameters: Mapping[str, float]) -> list[VariationalProblem]:

@@ -66,6 +66,12 @@ class VariationalProblem(BoundaryValueProblem):
     sizes : mapping of str to float, optional
         Sizes of states, multipliers and parameters whose values may be smaller, or round-off, where a run begins: forces
         without a load. ``sigma`` stands for all multipliers of end conditions.
+    work : callable, optional
+        ``work(t, x, y, p)``: of loads without an energy, the work per t that they do on the states y, as they are at the states
+        x: ``-p.pressure * (y.y * cos(x.angle) - y.x * sin(x.angle))`` for a pressure that follows a curve. States with
+        such loads have no index.
+    end_work : callable, optional
+        ``end_work(x0, x1, y0, y1, p)``: the same at the ends.
 
     Raises
     ------
@@ -107,6 +113,7 @@ class VariationalProblem(BoundaryValueProblem):
         functionals: Mapping[str, Function] | None = None, hamiltonian: Function | None = None,
         symmetries: Mapping[str, Symmetry] | None = None, domain: tuple[float, float] = (0.0, 1.0),
         starts: Mapping[str, float] | None = None, phases: Sequence[str] = (), sizes: Mapping[str, float] | None = None,
+        work: Function | None = None, end_work: Function | None = None,
     ) -> None:  # fmt: skip
         integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
         names = check_statement(states, parameters, functionals)
@@ -126,13 +133,14 @@ class VariationalProblem(BoundaryValueProblem):
             checks.number(f"starts: {name}", value)
         held = checks.chosen("phases", phases, names if hamiltonian is not None else tuple(integrals))
         taken = [("energy", energy, 4), ("kinematics", kinematics, 4), ("ends", ends, 3), ("end_energy", end_energy, 3)]
-        taken += [("hamiltonian", hamiltonian, 4), *((f"integrals: {name}", g, 4) for name, g in integrals.items())]
+        taken += [("hamiltonian", hamiltonian, 4), ("work", work, 4), ("end_work", end_work, 5)]
+        taken += [*((f"integrals: {name}", g, 4) for name, g in integrals.items())]
         for what, function, count in [*taken, *((f"functionals: {name}", f, 4) for name, f in functionals.items())]:
             if function is not None and argument_count(function) != count:
                 raise ProblemError(f"{what} must take {count} arguments")
         variation = Variation(
             energy, kinematics, ends, end_energy, hamiltonian, dict(integrals), dict(functionals), names, control_names,
-            tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names),
+            tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names), work, end_work,
         )  # fmt: skip
         phases = [f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held]
         self._derive(variation, canonical(variation), parameters, symmetries, phases, domain)
@@ -171,7 +179,8 @@ class VariationalProblem(BoundaryValueProblem):
         ends: Arguments = [v.states, v.states, v.parameters]
         return {
             **dict.fromkeys(("energy", "kinematics", "integrals", "functionals"), inside), "ends": ends, "end_energy": ends,
-            "hamiltonian": [None, v.states, v.states, v.parameters],
+            "hamiltonian": [None, v.states, v.states, v.parameters], "work": [None, v.states, v.states, v.parameters],
+            "end_work": [*[v.states] * 4, v.parameters],
         }  # fmt: skip
 
     def events(self) -> list[Event]:
@@ -184,17 +193,22 @@ class VariationalProblem(BoundaryValueProblem):
 
     def degenerate(self, system: Collocation, x: Array) -> str:
         """Return what makes the equations singular at a guess x."""
-        reason = degeneracy(system, x)
+        reason = degeneracy(system, x) if self.has_index else ""
         return reason and f"{reason}: no solution was found from this guess"
 
     def undetermined(self, system: Collocation, x: Array) -> str:
         """Return that conditions repeat or contradict each other at a solution x."""
-        return degeneracy(system, x, solved=True)
+        return degeneracy(system, x, solved=True) if self.has_index else ""
 
     @property
-    def index(self) -> Event:
-        """The number of independent ways to lower the energy."""
-        return INDEX
+    def has_index(self) -> bool:
+        """All loads have an energy."""
+        return self.variation.work is None and self.variation.end_work is None
+
+    @property
+    def index(self) -> Event | None:
+        """The number of independent ways to lower the energy; None with loads that have none."""
+        return INDEX if self.has_index else None
 
     @property
     def multipliers(self) -> tuple[str, ...]:

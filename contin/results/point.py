@@ -418,7 +418,9 @@ class Point(Record):
         1
         """
         if self.system.index is None:
-            raise ProblemError("second_variation: the problem has no energy; state it as a VariationalProblem")
+            loaded = getattr(self.system.problem, "variation", None) is not None
+            why = "its loads have no energy, so there is no index" if loaded else "it has no energy; state a VariationalProblem"
+            raise ProblemError(f"second_variation: the problem cannot have one: {why}")
         found = second_variation(self.system, self.x)  # type: ignore[arg-type]
         if found is None:
             raise ProblemError("second_variation: the energy is not convex in the controls there (Legendre's condition)")

@@ -60,7 +60,8 @@ class Shooting:
         member, net = self.network.members[name], self.network
         stiffness = [self.number(member.section, key) for key in ("B1", "B2", "C")]
         natural = [self.number(member.section, key) for key in ("kappa_n", "kappa_2", "tau_n")]
-        pressure, weight, field = (self.numbers.get(key, 0.0) for key in ("pressure", "weight", "field"))
+        names = ("pressure", "weight", "field", "follower_pressure")
+        pressure, weight, field, follower = (self.numbers.get(key, 0.0) for key in names)
         normal, down, along = (np.array(v) for v in (net.pressure_normal, net.weight_direction, net.field_direction))
 
         def rates(s, y):
@@ -69,7 +70,7 @@ class Shooting:
             u1, u2, u3 = change + natural
             turning = np.array([[0, -u3, u2], [u3, 0, -u1], [-u2, u1, 0]])
             d3, magnet = R[:, 2], R[:, net.magnetized]
-            load = weight * down - pressure * np.cross(d3, normal)
+            load = weight * down - pressure * np.cross(d3, normal) - follower * R[:, 1]
             energy = (
                 change @ (stiffness * change) / 2
                 if math.isfinite(stiffness[1])
@@ -124,6 +125,11 @@ class Shooting:
                 else:
                     found.append(apart)
             for number, given in net.loads.items():
+                turned = ends[0].frame @ _frame(net._drawn(joint.members[0])[:4]).T
+                for where, direction, arm in given.followers:
+                    if where == name:
+                        pull = turned @ direction * self.numbers[number]
+                        force, moment = force - pull, moment - np.cross(turned @ arm, pull)
                 for where, direction, arm in given.forces:
                     if where == name:
                         force = force - self.numbers[number] * np.array(direction)
