@@ -144,13 +144,15 @@ def _samples(shape, width: float, scale: float, line: float) -> tuple[np.ndarray
 def _flat_samples(mesh, paint: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (K, 3) of the flat quadrilaterals of a mesh, their unit normals (K, 3), and one paint for all."""
     corners = mesh.vertices[mesh.quads]
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max()
-    at = np.linspace(0, 1, math.ceil(longest * scale * _DENSE) + 2)
-    weights = np.stack([np.outer(1 - at, 1 - at), np.outer(at, 1 - at), np.outer(at, at), np.outer(1 - at, at)], axis=-1)
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    upright = sides[:, 1::2].max(axis=1) > sides[:, ::2].max(axis=1)  # long sides come first: thin ones take few samples
+    corners[upright], sides[upright] = np.roll(corners[upright], 1, axis=1), np.roll(sides[upright], 1, axis=1)
+    a, b = (np.linspace(0, 1, math.ceil(sides[:, k::2].max() * scale * _DENSE) + 2) for k in (0, 1))
+    weights = np.stack([np.outer(1 - a, 1 - b), np.outer(a, 1 - b), np.outer(a, b), np.outer(1 - a, b)], axis=-1)
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     points = np.einsum("abi,qij->qabj", weights, corners)
-    return points.reshape(-1, 3), np.repeat(normals, at.size**2, axis=0), np.full(len(corners) * at.size**2, paint)
+    return points.reshape(-1, 3), np.repeat(normals, a.size * b.size, axis=0), np.full(len(corners) * a.size * b.size, paint)
 
 
 def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
