@@ -32,7 +32,10 @@ def standing(shape: Shape | Structure, up: tuple[float, float, float] = DIRECTIO
 def moved(shape, axes: np.ndarray, by: np.ndarray, scale: float = 1.0):
     """Return a shape, or a structure, on new axes (rows), moved there, and then scaled."""
     if isinstance(shape, Structure):
-        arms = [replace(one, arm=tuple(scale * x for x in one.arm)) for one in shape.fixtures]
-        return replace(shape, parts=tuple(moved(part, axes, by, scale) for part in shape.parts), fixtures=tuple(arms))
+        there = []
+        for one in shape.fixtures:
+            axis = tuple(axes @ one.axis) if one.number else one.axis
+            there.append(replace(one, arm=tuple(scale * x for x in one.arm), axis=axis))
+        return replace(shape, parts=tuple(moved(part, axes, by, scale) for part in shape.parts), fixtures=tuple(there))
     x = (shape.centreline @ axes.T + by) * scale
     return replace(shape, arclength=shape.arclength * scale, centreline=x, directors=shape.directors @ axes.T)

@@ -9,11 +9,11 @@ import numpy as np
 
 from branches.draw.structure import parts_of, solids_of
 
-FRONT, BACK, EDGE, JOINT, SUPPORT = "#E8A33D", "#7A5195", "#2B1D0E", "#8FA3B5", "#4F5D6B"
+FRONT, BACK, EDGE, JOINT, SUPPORT, FORCE = "#E8A33D", "#7A5195", "#2B1D0E", "#8FA3B5", "#4F5D6B", "#C8372D"
 #: Paints of points by number: the side of a strip that looks to the eye, the other one, a line along an edge, a joint, a
-#: support.
-_PAINTS = (FRONT, BACK, EDGE, JOINT, SUPPORT)
-_SIDE, _BEHIND, _EDGE, _JOINT, _SUPPORT = range(5)
+#: support, a force.
+_PAINTS = (FRONT, BACK, EDGE, JOINT, SUPPORT, FORCE)
+_SIDE, _BEHIND, _EDGE, _JOINT, _SUPPORT, _FORCE = range(6)
 #: Width of a strip of unknown dimensions, in units of L/2 pi. Ten times more covers the loop's own radius.
 WIDTH = 0.3
 #: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
@@ -108,7 +108,8 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     scale = fine / (2 * reach)
     line = min(_LINE * _FINE / scale, _LINE_PART * width)
     samples = [_samples(part, width, scale, line) for part in parts_of(shape)]
-    samples += [_flat_samples(solid, _SUPPORT if one.held else _JOINT, scale) for one, solid in solids_of(shape, width)]
+    for one, solid in solids_of(shape, width):
+        samples.append(_flat_samples(solid, _FORCE if one.number else _SUPPORT if one.held else _JOINT, scale))
     points, normals, paint = (np.concatenate(column) for column in zip(*samples))
     screen = points @ view.axes.T
     place, nearness = _places(screen, reach, fine)

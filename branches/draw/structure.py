@@ -11,14 +11,15 @@ from contin.lowlevel import shown
 from ribbon_model.ends import Vector, perpendicular
 from ribbon_model.shape import Shape
 
-#: Forms of joints.
-BLOCK, PIN, BALL = "block", "pin", "ball"
+#: Forms of joints, and of dead forces.
+BLOCK, PIN, BALL, ARROW = "block", "pin", "ball", "arrow"
 #: Number of sides, and profile: (height along the axis, radius), over the width of the strips. A block covers the corners of
-#: strips that meet, a pin is a little longer than a strip is wide.
+#: strips that meet, a pin is a little longer than a strip is wide; the tip of an arrow is where its force acts.
 _FORMS: dict[str, tuple[int, list[tuple[float, float]]]] = {
-    BLOCK: (4, [(-0.56, 0.26), (0.56, 0.26)]),
-    PIN: (24, [(-0.68, 0.2), (0.68, 0.2)]),
-    BALL: (24, [(-0.36 * np.cos(x), 0.36 * np.sin(x)) for x in np.linspace(0, np.pi, 14)[1:-1].tolist()]),
+    BLOCK: (4, [(-0.56, 0.0), (-0.56, 0.26), (0.56, 0.26), (0.56, 0.0)]),
+    PIN: (24, [(-0.68, 0.0), (-0.68, 0.2), (0.68, 0.2), (0.68, 0.0)]),
+    ARROW: (24, [(-3.4, 0.0), (-3.4, 0.09), (-1.1, 0.09), (-1.1, 0.32), (0.0, 0.0)]),
+    BALL: (24, [(-0.36 * np.cos(x), 0.36 * np.sin(x)) for x in np.linspace(0, np.pi, 14).tolist()]),
 }
 #: Supports are larger than joints by this factor, so that a joint at a support is seen.
 _SUPPORT = 1.5
@@ -26,7 +27,7 @@ _SUPPORT = 1.5
 
 @dataclass(frozen=True)
 class Fixture:
-    """A joint or a support, fixed on an end of a strip.
+    """A joint or a support, fixed on an end of a strip; or a dead force that acts there, whose direction is fixed in space.
 
     Attributes
     ----------
@@ -37,9 +38,13 @@ class Fixture:
     arm, axis : tuple of float
         From there, and of a pin or a block, on the directors of the end.
     form : str
-        'block', 'pin' or 'ball'.
+        'block', 'pin', 'ball' or 'arrow'.
     held : bool
         Whether it is a support.
+    number : str
+        The name of a dead force. Its axis is on the axes of the structure, for positive numbers.
+    force : float
+        Value of that number, of which the sign matters.
     """
 
     part: int
@@ -47,18 +52,19 @@ class Fixture:
     arm: Vector
     axis: Vector
     form: str
-    held: bool
+    held: bool = False
+    number: str = ""
+    force: float = 1.0
 
     @property
     def turned(self) -> tuple[int, np.ndarray]:
         """The number of sides, and the profile from one end of the axis to the other: (height, radius), over the width."""
         sides, profile = _FORMS[self.form]
-        rings = np.array([(profile[0][0], 0.0), *profile, (profile[-1][0], 0.0)])
-        return sides, rings * (_SUPPORT if self.held else 1.0)
+        return sides, np.array(profile) * (_SUPPORT if self.held else 1.0)
 
     @property
     def axes(self) -> np.ndarray:
-        """The axis and two directions across it, on the directors of the end: rows (3, 3)."""
+        """The axis and two directions across it, on the directors of the end or, of forces, in space: rows (3, 3)."""
         return np.array([self.axis, *perpendicular(self.axis)])
 
     def solid(self, parts: tuple[Shape, ...], width: float) -> Mesh:
@@ -66,7 +72,7 @@ class Fixture:
         (sides, rings), shape = self.turned, parts[self.part]
         row = -1 if self.last else 0
         place = shape.centreline[row] + np.array(self.arm) @ shape.directors[row]
-        ahead, *across = self.axes @ shape.directors[row]
+        ahead, *across = np.sign(self.force) * self.axes @ (np.eye(3) if self.number else shape.directors[row])
         angles = 2 * np.pi * (np.arange(sides) + 0.5) / sides
         around = np.column_stack([np.cos(angles), np.sin(angles)]) @ np.array(across)
         points = place + width * (rings[:, :1, None] * ahead + rings[:, 1:, None] * around)
@@ -100,8 +106,8 @@ class Structure:
         return np.concatenate([part.centreline for part in self.parts])
 
     def solids(self, width: float) -> list[tuple[Fixture, Mesh]]:
-        """Return the joints and supports, each with its solid."""
-        return [(one, one.solid(self.parts, width)) for one in self.fixtures]
+        """Return the joints, the supports and the forces that are not zero, each with its solid."""
+        return [(one, one.solid(self.parts, width)) for one in self.fixtures if one.force != 0]
 
 
 def meshed(shape: Shape | Structure, width: float, thickness: float | None) -> Mesh:
@@ -116,7 +122,9 @@ def meshed(shape: Shape | Structure, width: float, thickness: float | None) -> M
         found = [solid(part, width, thickness) for part in parts]
     first = np.cumsum([0, *(len(part.arclength) for part in parts)])  # node of each strip among all
     found = [replace(mesh, stations=mesh.stations + start) for mesh, start in zip(found, first)]
-    for one, mesh in solids_of(shape, width) if thickness is not None else []:
+    for one, mesh in solids_of(shape, width):
+        if thickness is None or one.number:
+            continue
         found.append(replace(mesh, stations=mesh.stations + first[one.part]))
     return together(found)
 
@@ -126,6 +134,11 @@ def parts_of(shape: Shape | Structure) -> tuple[Shape, ...]:
     return shape.parts if isinstance(shape, Structure) else (shape,)
 
 
+def fixtures_of(shape: Shape | Structure) -> tuple[Fixture, ...]:
+    """Return the joints, supports and forces of a structure; a strip alone has none."""
+    return shape.fixtures if isinstance(shape, Structure) else ()
+
+
 def solids_of(shape: Shape | Structure, width: float) -> list[tuple[Fixture, Mesh]]:
-    """Return the joints and supports of a structure with their solids; a strip alone has none."""
+    """Return the joints, supports and forces of a structure with their solids; a strip alone has none."""
     return shape.solids(width) if isinstance(shape, Structure) else []

@@ -176,7 +176,7 @@ class Branch {
       parts = this.shapes.channels / CHANNELS;
     if (this.domain === "open") {
       const each = Array.from({ length: parts }, (_, i) => stations(states, this.shapes.nodes, i, parts));
-      return open(each, this.fixtures);
+      return open(each, this.fixtures.map((one) => ({ ...one, sign: this.sign(one, s) })));
     }
     const part = stations(states, this.shapes.nodes);
     if (this.domain === "loop") return flattened(part.slice(0, -1));
@@ -185,6 +185,11 @@ class Branch {
     if (this.domain !== "cell") return placed(turned(part).slice(0, -1));
     const axis = unit([this.value("M1", s) * this.columns.sense[0], this.value("M2", s) * this.columns.sense[0], 0]);
     return placed(repeated(mirrored(turned(part)), this.n, axis, 4 * this.columns.turn[0]), axis);
+  }
+
+  /** The sign of a force at the nearest point; 1 of joints and supports. */
+  sign({ signs = 1 }, s) {
+    return typeof signs === "string" ? unpacked(signs)[Math.round(s)] : signs;
   }
 
   /** How far each point is along the branch, 0 ... 1, by how much the shape changes on the way. */

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.draw.structure import Structure, parts_of
+from branches.draw.structure import Fixture, fixtures_of, parts_of
 from branches.explore.packing import column, compressed
 from branches.explore.profiles import marked
 from branches.explore.snaps import states_of
@@ -94,18 +94,21 @@ def _stages(path: Path, branch: StoredBranch, columns: list[str], shapes: dict) 
     for number in np.unique(branch.stage_of):
         first = next(shape for point, shape in shapes.items() if branch.stage_of[point] == number)
         about = _stage(path, branch, int(number), columns) | {"shapes": compressed(states[branch.stage_of == number])}
-        yield about | {"fixtures": _fixtures(first, unit) if isinstance(first, Structure) else []}
+        yield about | {"fixtures": [_fixture(branch, int(number), one, unit) for one in fixtures_of(first)]}
 
 
-def _fixtures(shape: Structure, unit: float) -> list[dict]:
-    """Return the joints and supports: where they are fixed, and the profile that is turned around the first axis."""
-    return [
-        {
-            "part": one.part, "last": one.last, "held": one.held, "arm": [unit * x for x in one.arm],
-            "axes": one.axes.tolist(), "sides": one.turned[0], "profile": one.turned[1].tolist(),
-        }
-        for one in shape.fixtures
-    ]  # fmt: skip
+def _fixture(branch: StoredBranch, stage: int, one: Fixture, unit: float) -> dict:
+    """Return a joint, a support or a force: where it is fixed, and the profile that is turned around the first axis.
+
+    ``signs`` are those of a force at the points of the stage.
+    """
+    about = {
+        "part": one.part, "last": one.last, "held": one.held, "arm": [unit * x for x in one.arm],
+        "axes": one.axes.tolist(), "sides": one.turned[0], "profile": one.turned[1].tolist(),
+    }  # fmt: skip
+    if not one.number:
+        return about
+    return about | {"signs": column(np.sign(branch.force(one.number)[branch.stage_of == stage]).astype(int))}
 
 
 def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) -> dict:

@@ -39,8 +39,8 @@ function ribbonTraces(strip) {
     },
   ];
   if (strip.fixtures && strip.fixtures.length) {
-    const { place, corners, held } = fixtureMesh(strip, width(), scale),
-      tints = held.flatMap((one) => Array(4).fill(colour(one ? "support" : "joint")));
+    const { place, corners, paints } = fixtureMesh(strip, width(), scale),
+      tints = paints.flatMap((paint) => Array(4).fill(colour(paint)));
     traces.push({ type: "mesh3d", ...place, ...corners, vertexcolor: tints, flatshading: true, ...LIT });
   }
   if ($("triads").checked)
@@ -167,7 +167,7 @@ function fills() {
     colour(side)
       .match(/\w\w/g)
       .map((part) => parseInt(part, 16));
-  const known = Object.fromEntries(["front", "rear", "joint", "support"].map((side) => [side, parts(side)]));
+  const known = Object.fromEntries(["front", "rear", "joint", "support", "force"].map((side) => [side, parts(side)]));
   return ({ side, shade }) => `rgb(${known[side].map((part) => Math.round(part * shade)).join(",")})`;
 }
 

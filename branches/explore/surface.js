@@ -84,30 +84,34 @@ function triangles(strip) {
   return { i, j, k };
 }
 
-/** Quadrilaterals of the joints and supports: corners, and whether they are of a support. A profile is turned around an axis. */
+/** Quadrilaterals of joints, supports and forces: corners, and their paint. A profile is turned around an axis; that of a force
+ * points against it for negative numbers, and is a point for zero. */
 function fixtureQuads(strip, width, scale) {
-  return (strip.fixtures || []).flatMap(({ station, arm, axes, sides, profile, held }) => {
+  return (strip.fixtures || []).flatMap(({ station, arm, axes, sides, profile, held, signs, sign }) => {
     const at = (i) => strip.subarray(station * STATION + i, station * STATION + i + 3),
       turn = (a) => a.reduce((sum, part, i) => along(sum, part, at(3 + 3 * i)), [0, 0, 0]),
       place = along(turn(arm), 1, at(0)),
-      [ahead, ...across] = axes.map(turn);
+      isForce = signs !== undefined,
+      [ahead, ...across] = isForce ? axes : axes.map(turn), // the direction of a force is fixed in space
+      size = width * sign,
+      paint = isForce ? "force" : held ? "support" : "joint";
     const rings = profile.map(([height, radius]) =>
       Array.from({ length: sides }, (_, k) => {
         const angle = (2 * Math.PI * (k + 0.5)) / sides,
           aside = along(along([0, 0, 0], Math.cos(angle), across[0]), Math.sin(angle), across[1]);
-        return along([0, 0, 0], scale, along(along(place, width * height, ahead), width * radius, aside));
+        return along([0, 0, 0], scale, along(along(place, size * height, ahead), size * radius, aside));
       }),
     );
     return rings.slice(1).flatMap((ring, r) =>
       ring.map((corner, k) => {
         const next = (k + 1) % sides;
-        return { corners: [rings[r][k], rings[r][next], ring[next], corner], held };
+        return { corners: [rings[r][k], rings[r][next], ring[next], corner], paint };
       }),
     );
   });
 }
 
-/** The same as a mesh: coordinates, corners of triangles, and whether each vertex is of a support. */
+/** The same as a mesh: coordinates, corners of triangles, and the paint of each quadrilateral. */
 function fixtureMesh(strip, width, scale) {
   const quads = fixtureQuads(strip, width, scale),
     points = quads.flatMap(({ corners }) => corners),
@@ -120,7 +124,7 @@ function fixtureMesh(strip, width, scale) {
       j: first.flatMap((q) => [q + 1, q + 2]),
       k: first.flatMap((q) => [q + 2, q + 3]),
     },
-    held: quads.map(({ held }) => held),
+    paints: quads.map(({ paint }) => paint),
   };
 }
 
@@ -147,9 +151,9 @@ function polygons(strip, width, scale, eye, every = 1) {
     const [c, d] = rows[next[k]];
     add([a, b, d, c], normal, dot(normal, view) > 0 ? "front" : "rear");
   });
-  for (const { corners, held } of fixtureQuads(strip, width, scale)) {
+  for (const { corners, paint } of fixtureQuads(strip, width, scale)) {
     const normal = unit(cross(along(corners[2], -1, corners[0]), along(corners[3], -1, corners[1])));
-    if (dot(normal, view) > 0) add(corners, normal, held ? "support" : "joint");
+    if (dot(normal, view) > 0) add(corners, normal, paint);
   }
   return result.sort((p, q) => p.depth - q.depth);
 }

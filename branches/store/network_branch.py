@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from branches.draw.shapes import flat_across
 from branches.draw.strip import View
-from branches.draw.structure import BALL, BLOCK, PIN, Fixture, Structure
+from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure
 from branches.store.open_branch import OpenBranch
 from ribbon_model.ends import CLAMPED, HINGED, unit
 from ribbon_model.equilibrium import directors
@@ -18,6 +20,8 @@ from ribbon_model.network import HINGE, RIGID, START, Joint, JointEnd, Network
 _VIEW = View(-70.0, 20.0)
 #: Two tangents whose product differs from 1 by less are one direction: a strip that goes on there has no corner.
 _STRAIGHT = 1e-9
+#: A dead force below this part of the largest one is not drawn: forces are found to 1e-12 and better.
+_NOTHING = 1e-9
 
 
 class NetworkBranch(OpenBranch):
@@ -32,7 +36,19 @@ class NetworkBranch(OpenBranch):
         laws = [network.sections[member.section].form for member in network.members.values()]
         shapes = tuple(map(flat_across, network.shapes_at(t, states, values).values(), laws))
         strains = np.concatenate([*network.strains_at(t, states, values).values()])
-        return Structure(shapes, tuple(fixtures(network))), strains
+        found = [replace(one, force=self.force(one.number)[point]) if one.number else one for one in fixtures(network)]
+        return Structure(shapes, tuple(found)), strains
+
+    def force(self, number: str) -> np.ndarray:
+        """Return a dead force at all points, 0 where it is round-off of the largest one in the file."""
+        values = self.points[number]
+        return np.where(np.abs(values) > _NOTHING * self._largest, values, 0.0)
+
+    @functools.cached_property
+    def _largest(self) -> float:
+        """The largest dead force in the file."""
+        names = {one.number for stage in self.stages for one in fixtures(stage.strip) if one.number}
+        return max((float(np.abs(self.points[name]).max()) for name in names), default=0.0)
 
     def placed(self, point: int, length: float, cells: int = 0):
         """Return the strips scaled so that the longest one has this length, and their strains, with so many cells in all."""
@@ -64,7 +80,13 @@ class NetworkBranch(OpenBranch):
 
 
 def fixtures(network: Network) -> Iterator[Fixture]:
-    """Yield what is drawn of the joints of a network: supports, and joints but where a strip just goes on."""
+    """Yield what is drawn of a network beside its strips: dead forces, supports, and joints but where a strip just goes on."""
+    for number, load in network.loads.items():
+        for name, direction, arm in load.forces:
+            first = network.joints[name].members[0]
+            there = np.array(first.arm) + _frame(network, first) @ np.array(arm)
+            at = list(network.members).index(first.member), first.end != START
+            yield Fixture(*at, tuple(map(float, there)), unit("force", direction), ARROW, number=number)
     for name, joint in network.joints.items():
         held = network.held.get(name)
         if held is not None and (held.held or held.rotation == CLAMPED):

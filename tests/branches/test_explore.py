@@ -593,7 +593,8 @@ def test_page_of_a_network(tmp_path, root, browser):
     assert "index 1" in browser.js("document.getElementById('readout').textContent")
     assert browser.js("document.getElementById('ribbon').data.map(({type}) => type)") == ["mesh3d", "mesh3d"]  # strips, joints
     meshes = browser.js("document.getElementById('ribbon').data.map(({x, i}) => [x.length, i.length])")
-    assert meshes == [[4 * 3 * 2 * 97, 4 * 3 * 2 * 97], [4 * 4 * 3 * 4, 2 * 4 * 3 * 4]]  # blocks of three rings of four sides
+    quads = 4 * 3 * 4 + 2 * 4 * 24  # four blocks of four sides, two arrows, with three and four parts along their axes
+    assert meshes == [[4 * 3 * 2 * 97, 4 * 3 * 2 * 97], [4 * quads, 2 * quads]]
     tips = "[...document.getElementById('diagram').data.flatMap(({text}) => text || [])]"
     assert {"BP 1", "BP 2", "<b>1</b>", "<b>2</b>"} <= {text.strip("\u2002") for text in browser.js(tips)}
     assert browser.colours("#ribbon") > 200

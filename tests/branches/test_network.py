@@ -283,8 +283,10 @@ def test_rollers_that_come_and_go(run):
     assert second[0]["energy"] == pytest.approx(first[-1]["energy"], abs=1e-10)
     assert third[0]["M_force_y"] == pytest.approx(second[-1]["F_M_y"], abs=1e-8)
     assert third["F_M_y"] == pytest.approx(0, abs=0)
-    assert len(branch.shape(int(np.flatnonzero(branch.stage_of == 2)[0])).fixtures) == 3
-    assert len(branch.shape(len(branch.points) - 1).fixtures) == 1
+    for stage, forms in ((2, [*["arrow"] * 2, "block", "ball", "ball"]), (3, [*["arrow"] * 5, "block", "ball"])):
+        shown = branch.shape(int(np.flatnonzero(branch.stage_of == stage)[0]))
+        assert [one.form for one in shown.fixtures] == forms
+        assert len(shown.solids(0.1)) == 3  # of the dead forces one is not zero, at the roller that was let go
     assert last[-1]["energy"] == pytest.approx(0, abs=1e-12)
     assert last[-1]["Q_dy"] == pytest.approx(0, abs=1e-9)
     assert last[-1]["M_dy"] == pytest.approx(0, abs=1e-9)  # it is not prescribed there, and found
@@ -375,14 +377,23 @@ stages:
 
 
 def test_joints_are_fixed_on_strips(run):
-    """Supports and joints are where the columns say; the place of a load, where the strip goes on, is none."""
+    """Supports and joints are where the columns say; at the load, where the strip goes on, is an arrow that ends there."""
     branch = run(JOINED)
     last = len(branch.points) - 1
     shape = branch.shape(last)
     assert [(one.form, one.held) for one in shape.fixtures] == [
-        ("block", True), ("block", False), ("pin", False), ("ball", True),
+        ("arrow", False), ("block", True), ("block", False), ("pin", False), ("ball", True),
     ]  # fmt: skip
-    for name, (one, solid) in zip(("A", "corner", "pin", "end"), shape.solids(0.1)):
+    (_, arrow), *others = shape.solids(0.1)
+    place = [branch.points[last][f"b_at_0_5_{axis}"] for axis in "xyz"]
+    away = arrow.vertices - place
+    assert away.min(axis=0)[2] == pytest.approx(0, abs=1e-9)  # the force is downwards
+    assert np.abs(away[np.argmin(away[:, 2])]).max() < 1e-9
+    assert np.ptp(away[:, 2]) > 3 * np.ptp(away[:, :2])
+    assert len(branch.shape(0).solids(0.1)) == 4  # without force there is no arrow
+    standing = branch.posed([last])[last]
+    assert standing.fixtures[0].axis == pytest.approx([-1, 0, 0])  # on axes where z is the normal y of the drawing
+    for name, (one, solid) in zip(("A", "corner", "pin", "end"), others):
         place = [branch.points[last][f"{name}_{axis}"] for axis in "xyz"]
         sides, profile = one.turned
         middle = (solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2
@@ -392,7 +403,7 @@ def test_joints_are_fixed_on_strips(run):
         (h, r) = 0.1 * profile.T
         cones = area * np.diff(h) * (r[1:] ** 2 + r[1:] * r[:-1] + r[:-1] ** 2) / 3
         assert np.linalg.det(np.stack([x, y, z], axis=1)).sum() / 6 == pytest.approx(cones.sum(), rel=1e-12)  # closed, outwards
-    pin = shape.fixtures[2]
+    pin = shape.fixtures[3]
     state = shape.parts[pin.part]
     axis = np.array(pin.axis) @ state.directors[-1 if pin.last else 0]
     assert abs(axis @ [1, 0, 0]) == pytest.approx(1, abs=1e-9)  # the plane of the drawing is that of the state
@@ -401,11 +412,12 @@ def test_joints_are_fixed_on_strips(run):
 def test_a_picture_shows_joints(run):
     """Blocks and supports have their own colours, in front of the strips."""
     branch = run("network_portal")
-    shape = branch.posed([0])[0]
+    shape = branch.posed([0])[0]  # P = 0: without arrows
     without = replace(shape, fixtures=())
     one, other = (rendered(each, 0.06, reach_of([shape], 0.06, branch.view), 300, branch.view) for each in (shape, without))
     changed = np.abs(one - other).max(axis=-1) > 0.05
     assert 100 < np.count_nonzero(changed) < 0.05 * changed.size
+    assert [one.form for one in shape.fixtures] == ["arrow", "arrow", *["block"] * 4]
     blue = one[changed & (one[..., 3] > 0.99)][:, :3]
     assert np.mean(blue[:, 2] > blue[:, 0]) > 0.9  # steel, where strips are orange or violet
 
@@ -436,7 +448,8 @@ def test_the_page_of_a_network(run, tmp_path):
     assert (first["name"], second["name"]) == ("stage 1: P", "stage 2: P")
     assert page["shown"] == ["P", "B_y"]
     assert [mark["tag"] for mark in first["marks"][1:-1]] == ["BP 1", "BP 2"]
-    assert [len(one["fixtures"]) for one in (first, second)] == [4, 4]
+    assert [["signs" in fixture for fixture in one["fixtures"]] for one in (first, second)] == [[True] * 2 + [False] * 4] * 2
+    assert second["fixtures"][0]["signs"] == 1  # at all points; of the first stage there is none at P = 0
     assert first["shapes"]["channels"] == 3 * 8
     shown = branch.posed([len(branch.points) - 1])[len(branch.points) - 1]
     places = decoded(second)[-1].reshape(-1, 3, 8)[..., -3:]
