@@ -34,7 +34,7 @@ def moved(shape, axes: np.ndarray, by: np.ndarray, scale: float = 1.0):
     if isinstance(shape, Structure):
         there = []
         for one in shape.fixtures:
-            axis = tuple(axes @ one.axis) if one.number else one.axis
+            axis = tuple(axes @ one.axis) if one.in_space else one.axis
             there.append(replace(one, arm=tuple(scale * x for x in one.arm), axis=axis))
         return replace(shape, parts=tuple(moved(part, axes, by, scale) for part in shape.parts), fixtures=tuple(there))
     x = (shape.centreline @ axes.T + by) * scale

@@ -27,7 +27,7 @@ _SUPPORT = 1.5
 
 @dataclass(frozen=True)
 class Fixture:
-    """A joint or a support, fixed on an end of a strip; or a dead force that acts there, whose direction is fixed in space.
+    """A joint or a support, fixed on an end of a strip; or a force that acts there.
 
     Attributes
     ----------
@@ -42,9 +42,11 @@ class Fixture:
     held : bool
         Whether it is a support.
     number : str
-        The name of a dead force. Its axis is on the axes of the structure, for positive numbers.
+        The name of a force.
     force : float
         Value of that number, of which the sign matters.
+    in_space : bool
+        Whether the axis is on the axes of the structure, as that of a dead force.
     """
 
     part: int
@@ -55,6 +57,7 @@ class Fixture:
     held: bool = False
     number: str = ""
     force: float = 1.0
+    in_space: bool = False
 
     @property
     def turned(self) -> tuple[int, np.ndarray]:
@@ -64,7 +67,7 @@ class Fixture:
 
     @property
     def axes(self) -> np.ndarray:
-        """The axis and two directions across it, on the directors of the end or, of forces, in space: rows (3, 3)."""
+        """The axis and two directions across it, on the directors of the end or, of dead forces, in space: rows (3, 3)."""
         return np.array([self.axis, *perpendicular(self.axis)])
 
     def solid(self, parts: tuple[Shape, ...], width: float) -> Mesh:
@@ -72,7 +75,7 @@ class Fixture:
         (sides, rings), shape = self.turned, parts[self.part]
         row = -1 if self.last else 0
         place = shape.centreline[row] + np.array(self.arm) @ shape.directors[row]
-        ahead, *across = np.sign(self.force) * self.axes @ (np.eye(3) if self.number else shape.directors[row])
+        ahead, *across = np.sign(self.force) * self.axes @ (np.eye(3) if self.in_space else shape.directors[row])
         angles = 2 * np.pi * (np.arange(sides) + 0.5) / sides
         around = np.column_stack([np.cos(angles), np.sin(angles)]) @ np.array(across)
         points = place + width * (rings[:, :1, None] * ahead + rings[:, 1:, None] * around)

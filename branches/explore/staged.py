@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from branches.explore.profiles import marked
 from branches.explore.snaps import states_of
 from branches.explore.solutions import filled, solutions
 from branches.explore.strips import UNKNOWN
+from branches.run.barriers import falls, told
 from branches.scene.columns import NUMBER
 from branches.scene.labels import START, label_of
 from branches.store.branch import StoredBranch
@@ -30,8 +31,10 @@ _ROOM = 24
 _FAR, _FILLED = 1.1, 0.92
 
 
-def gathered(files: list[Path], title: str) -> dict:
+def gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     """Return the data of a page; see `branches.explore.gather.gather`.
+
+    With ``slow``, it says what strips do past folds, which takes seconds for each.
 
     Raises
     ------
@@ -51,13 +54,13 @@ def gathered(files: list[Path], title: str) -> dict:
     brief = {"energy", "potential", *(first.conjugate(stage.follow) for stage in first.stages)}
     brief |= {name for name in varying if first.columns.all[name].role == NUMBER}
     stages, reach = [], 0.0
+    kept = [*dict.fromkeys([*varying, *shown])]
     for path, branch in branches:
+        snaps = {fall.row: f"Let go past it, the strip {told(branch, fall)}." for fall in falls(branch)} if slow else {}
         shapes, scale = _shapes(branch), 2 * np.pi / branch.shape_length
         reach = max(reach, scale * max(np.linalg.norm(shape.centreline, axis=1).max() for shape in shapes.values()))
         about = "" if len(branches) == 1 else f"{path.stem}, "
-        stages += [
-            one | {"name": about + one["name"]} for one in _stages(path, branch, [*dict.fromkeys([*varying, *shown])], shapes)
-        ]
+        stages += [one | {"name": about + one["name"]} for one in _stages(path, branch, kept, shapes, snaps)]
     return {
         "title": title or first.config["title"] or first.scene.name, "kind": "open",
         "axes": [
@@ -89,11 +92,13 @@ def _states(branch: StoredBranch, shapes: dict) -> np.ndarray:
     return filled(branch, list(shapes), np.concatenate(strips, axis=-1))
 
 
-def _stages(path: Path, branch: StoredBranch, columns: list[str], shapes: dict) -> Iterator[dict]:
+def _stages(
+    path: Path, branch: StoredBranch, columns: list[str], shapes: dict, snaps: Mapping[int, str]
+) -> Iterator[dict]:  # fmt: skip
     states, unit = _states(branch, shapes), 2 * np.pi / branch.shape_length
     for number in np.unique(branch.stage_of):
         first = next(shape for point, shape in shapes.items() if branch.stage_of[point] == number)
-        about = _stage(path, branch, int(number), columns) | {"shapes": compressed(states[branch.stage_of == number])}
+        about = _stage(path, branch, int(number), columns, snaps) | {"shapes": compressed(states[branch.stage_of == number])}
         yield about | {"fixtures": [_fixture(branch, int(number), one, unit) for one in fixtures_of(first)]}
 
 
@@ -103,7 +108,7 @@ def _fixture(branch: StoredBranch, stage: int, one: Fixture, unit: float) -> dic
     ``signs`` are those of a force at the points of the stage.
     """
     about = {
-        "part": one.part, "last": one.last, "held": one.held, "arm": [unit * x for x in one.arm],
+        "part": one.part, "last": one.last, "held": one.held, "inSpace": one.in_space, "arm": [unit * x for x in one.arm],
         "axes": one.axes.tolist(), "sides": one.turned[0], "profile": one.turned[1].tolist(),
     }  # fmt: skip
     if not one.number:
@@ -111,21 +116,25 @@ def _fixture(branch: StoredBranch, stage: int, one: Fixture, unit: float) -> dic
     return about | {"signs": column(np.sign(branch.force(one.number)[branch.stage_of == stage]).astype(int))}
 
 
-def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str]) -> dict:
+def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str], snaps: Mapping[int, str]) -> dict:
     rows = np.flatnonzero(branch.stage_of == number)
     labels = [branch.points["label"][row].decode() for row in rows]
     names = {int(event["point"]): event["name"].decode() for event in branch.events}
     last, singular = number == branch.points["stage"][-1], [bool(label) and label_of(label).singular for label in labels]
     table = {name: branch.points[name][rows] for name in (*columns, "arclength", "index")}
     table["index"] = np.where(singular, UNKNOWN, table["index"])  # there, that of one side is as good as that of the other
+    if (table["index"] == UNKNOWN).all():  # as under loads without an energy
+        del table["index"]
     after = {int(event["point"]): int(event["index_after"]) for event in branch.events}
     about = marked(labels, [names.get(int(row), "") for row in rows])
     count: collections.Counter = collections.Counter()
     for mark in about["marks"]:  # as `start_at` of a scene names them
-        label = labels[mark["point"]]
-        if after[int(rows[mark["point"]])] >= 0:
-            mark["index_after"] = after[int(rows[mark["point"]])]
-        if names.get(int(rows[mark["point"]])) != START:
+        label, row = labels[mark["point"]], int(rows[mark["point"]])
+        if row in snaps:
+            mark["fall"] = snaps[row]
+        if after[row] >= 0:
+            mark["index_after"] = after[row]
+        if names.get(row) != START:
             count[label] += 1
             mark["tag"] = f"{label} {count[label]}"
     return {

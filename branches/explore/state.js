@@ -95,7 +95,7 @@ function story() {
   const { branch, s } = now,
     mark = markAt(branch, s),
     [kind] = stability(branch, s);
-  if (branch.profile) return mark ? `Special point: ${mark.name}.` : branch.stop && `The run stopped: ${branch.stop}.`;
+  if (branch.profile) return mark ? `Special point: ${mark.name}. ${mark.fall || ""}`.trim() : branch.stop && `The run stopped: ${branch.stop}.`;
   if (branch.circle)
     return `A flat ring: the strip goes round ${Math.abs(branch.m) === 1 ? "once" : `${Math.abs(branch.m)} times`} (${loopName(branch.m)}). ${STEADY[kind]}`;
   if (mark && mark.kind === "circle")

@@ -87,12 +87,12 @@ function triangles(strip) {
 /** Quadrilaterals of joints, supports and forces: corners, and their paint. A profile is turned around an axis; that of a force
  * points against it for negative numbers, and is a point for zero. */
 function fixtureQuads(strip, width, scale) {
-  return (strip.fixtures || []).flatMap(({ station, arm, axes, sides, profile, held, signs, sign }) => {
+  return (strip.fixtures || []).flatMap(({ station, arm, axes, sides, profile, held, inSpace, signs, sign }) => {
     const at = (i) => strip.subarray(station * STATION + i, station * STATION + i + 3),
       turn = (a) => a.reduce((sum, part, i) => along(sum, part, at(3 + 3 * i)), [0, 0, 0]),
       place = along(turn(arm), 1, at(0)),
       isForce = signs !== undefined,
-      [ahead, ...across] = isForce ? axes : axes.map(turn), // the direction of a force is fixed in space
+      [ahead, ...across] = inSpace ? axes : axes.map(turn), // the direction of a dead force is fixed in space
       size = width * sign,
       paint = isForce ? "force" : held ? "support" : "joint";
     const rings = profile.map(([height, radius]) =>

@@ -248,9 +248,14 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
     lines += [f"past folds at which stable states end{energies_in}:"] if snaps else []
     for fall in snaps:
         where = _at(branch, fall.column, float(branch.points[fall.column][fall.row]), int(branch.points["stage"][fall.row]))
-        into = fall.into or "a state that is not in the result"
-        lines.append(f"  {where}, point {fall.row}: falls into {into}, which releases {fall.released * factor:.6g}")
+        lines.append(f"  {where}, point {fall.row}: {told(branch, fall)}")
     return lines
+
+
+def told(branch: OpenBranch, fall: Fall) -> str:
+    """Return into what a strip falls past a fold, and how much energy that releases, in words without a unit."""
+    into = fall.into or "a state that is not in the result"
+    return f"falls into {into}, which releases {fall.released * branch.scene.factor('potential'):.6g}"
 
 
 def _words(branch: OpenBranch, place: Place) -> str:

@@ -80,13 +80,15 @@ class NetworkBranch(OpenBranch):
 
 
 def fixtures(network: Network) -> Iterator[Fixture]:
-    """Yield what is drawn of a network beside its strips: dead forces, supports, and joints but where a strip just goes on."""
+    """Yield what is drawn of a network beside its strips: forces, supports, and joints but where a strip just goes on."""
     for number, load in network.loads.items():
-        for name, direction, arm in load.forces:
-            first = network.joints[name].members[0]
-            there = np.array(first.arm) + _frame(network, first) @ np.array(arm)
-            at = list(network.members).index(first.member), first.end != START
-            yield Fixture(*at, tuple(map(float, there)), unit("force", direction), ARROW, number=number)
+        for follows, forces in ((False, load.forces), (True, load.followers)):
+            for name, direction, arm in forces:
+                first = network.joints[name].members[0]
+                frame, at = _frame(network, first), (list(network.members).index(first.member), first.end != START)
+                there = tuple(map(float, np.array(first.arm) + frame @ np.array(arm)))
+                axis = unit("force", frame @ np.array(direction) if follows else direction)
+                yield Fixture(*at, there, axis, ARROW, number=number, in_space=not follows)
     for name, joint in network.joints.items():
         held = network.held.get(name)
         if held is not None and (held.held or held.rotation == CLAMPED):

@@ -12,7 +12,7 @@ from branches.draw.strip import reach_of, rendered
 from branches.explore.gather import gather
 from branches.export.__main__ import main as export
 from branches.read import read_branch
-from branches.run.barriers import falls, places, report
+from branches.run.barriers import falls, places, report, told
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
@@ -331,10 +331,12 @@ def test_the_barrier_of_a_buckled_column(run):
     assert report(branch)[0] == "to leave stable states:"
 
 
-def test_the_snap_of_an_arch(run, root):
+def test_the_snap_of_an_arch(run, root, tmp_path):
     """Past its fold it falls to the other side: the energy is that of an arch that is drawn there, without the segments."""
     branch = run("network_arch")
     (fall,) = falls(branch)
+    (stage,) = gather([str(tmp_path / "result.h5")])["families"][0]["branches"]
+    assert [mark["fall"] for mark in stage["marks"] if "fall" in mark] == [f"Let go past it, the strip {told(branch, fall)}."]
     assert fall.into is None
     assert fall.value == pytest.approx(branch.points["P"][fall.row] + past(0, 1) * (1 + branch.points["P"][fall.row]))
     before = branch.points[fall.row]
@@ -407,6 +409,21 @@ def test_joints_are_fixed_on_strips(run):
     state = shape.parts[pin.part]
     axis = np.array(pin.axis) @ state.directors[-1 if pin.last else 0]
     assert abs(axis @ [1, 0, 0]) == pytest.approx(1, abs=1e-9)  # the plane of the drawing is that of the state
+
+
+def test_a_force_that_follows_is_an_arrow_that_turns(run, tmp_path):
+    """It keeps its angle to the strip; the page, too, turns it with the end, and says nothing of an index."""
+    branch = run(CANTILEVER.replace("{tip: [0, 0, -1]}", "{tip: {force: [0, -1, 0], follows: true}}"))
+    last = len(branch.points) - 1
+    shape = branch.shape(last)
+    (_, arrow), *_ = shape.solids(0.1)
+    end = shape.parts[-1]
+    tip = end.centreline[-1]
+    behind = arrow.vertices.mean(axis=0) - tip
+    assert behind / np.linalg.norm(behind) == pytest.approx(end.directors[-1, 1], abs=1e-3)
+    assert end.directors[-1, 1] != pytest.approx([0, 1, 0], abs=0.5)
+    (stage,) = gather([str(tmp_path / "result.h5")])["families"][0]["branches"]
+    assert (stage["fixtures"][0]["inSpace"], "index" in stage["columns"]) == (False, False)
 
 
 def test_a_picture_shows_joints(run):
