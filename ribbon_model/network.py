@@ -82,6 +82,12 @@ _NEAR = 0.3
 _ZERO = 1e-10
 
 
+class OutOfReach(ProblemError):
+    """A drawing from which no state was found, though one may be there; ``nearest`` is how near it was brought to one."""
+
+    nearest: Point
+
+
 @dataclass(frozen=True)
 class Member:
     """A strip of a network, as it is drawn.
@@ -649,35 +655,50 @@ class Network:
 
         Raises
         ------
+        OutOfReach
+            No state was found; `ribbon_model.network_first` has a further way.
         ProblemError
-            No state was found, or nothing determines it.
+            Nothing determines the state.
         """
-        options = {"intervals": intervals, "degree": degree, "mesh": _MESH, **options}
+        options = {"intervals": intervals, "degree": degree, **options}
         is_drawn = guess is None
         guess = self.guess() if is_drawn else guess
         first: ContinError | None = None
         try:
-            point = self._determined(solve(self.problem, guess, values, **options))
+            point = self.state_near(guess, values, **options)
             if self._moved_by(point, guess) < _NEAR:
                 return point, "from the drawing"
         except ContinError as error:
             first = error
         try:
-            drawn = self._determined(solve(self.problem, guess, {**(values or {}), ASSEMBLY: 0.0}, **options))
+            drawn = self.state_near(guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
         except ContinError as error:
             singular = is_drawn and isinstance(error, ConvergenceError)  # the drawing is a solution: what fails is the matrix
             raise ProblemError(MECHANISM if singular else self._reason(error)) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
             told = f": {self._reason(first)}" if first else ""
-            raise ProblemError(
+            nearest = max(way, key=lambda point: point[ASSEMBLY])
+            reason = OutOfReach(
                 f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
-                f"{max(point[ASSEMBLY] for point in way):.3g} of the way; draw the network nearer to a state{told}"
+                f"{nearest[ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
             )
+            reason.nearest = nearest
+            raise reason
         try:
             return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
         except ContinError as error:  # the way has come there: what fails is the matrix
             raise ProblemError(MECHANISM) from error
+
+    def state_near(self, guess: Any, values: Mapping[str, float] | None = None, **options: Any) -> Point:
+        """Return the state that Newton's method finds from a guess.
+
+        Raises
+        ------
+        ContinError
+            There is none, or nothing determines it.
+        """
+        return self._determined(solve(self.problem, guess, values, **{"mesh": _MESH, **options}))
 
     def with_phases(self, point: Point, nullity: int = 2, free: int = 1) -> tuple[Network, Point]:
         """Return the network with phases that hold neutral modes of a state, and the state as one of it.

@@ -292,8 +292,9 @@ class NetworkChain:
                 if kind != BALL:
                     frame, now, rows = self._joint_frame(base), self._joint_frame(each), np.eye(3)
                     if kind == HINGE:
-                        frame, _ = _turned(frame, now, np.array(joint.axis))
-                        rows = np.array(ends.perpendicular(ends.unit("axis", joint.axis)))
+                        axis = ends.unit("axis", joint.axis)
+                        frame, _ = _turned(frame, now, np.array(axis))
+                        rows = np.array(ends.perpendicular(axis))
                     yield _Condition(True, rows @ frame.T, rows @ _vector(frame.T @ now), here, self._end(base))
                 before = each
 

@@ -14,6 +14,7 @@ from contin.lowlevel import Collocation, Continuation
 from ribbon_model.changed_supports import held_at, with_supports
 from ribbon_model.ends import ANGLES
 from ribbon_model.network import ASSEMBLY, MOVES
+from ribbon_model.network_first import first_state
 
 #: Axes of the drawing.
 _AXES = "xyz"
@@ -35,8 +36,8 @@ class NetworkStage(OpenStage):
     def first(self) -> Point:
         mesh = self.scene.mesh
         try:
-            point, self._how = self.strip.first_point(
-                None, None, mesh.intervals, mesh.degree, mesh=self.mesh_control(), newton=newton_of(self.scene)
+            point, self._how = first_state(
+                self.strip, mesh.intervals, mesh.degree, mesh=self.mesh_control(), newton=newton_of(self.scene)
             )
         except (ContinError, ValueError) as error:
             raise ConfigError(f"strips: no first state was found from the drawing: {error}") from error

@@ -1,0 +1,75 @@
+"""First states of networks that Newton's method does not reach: the energy of the network of segments is minimised.
+
+The state that the drawing without stress was brought to is cut into segments (`ribbon_model.network_segments`), joined, and
+follows its energy downhill until it rests (`ribbon_model.descent`). From there Newton's method leads to the state. It is a
+minimum, if not always the nearest one.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contin import ContinError, Point
+from ribbon_model.network import ASSEMBLY, Network, OutOfReach
+from ribbon_model.shape import quaternions
+
+if TYPE_CHECKING:
+    from ribbon_model.network_segments import Piece
+
+#: Segments of all members together. Half as many leave Newton's method too far from some states, twice as many take four times
+#: as long.
+_SEGMENTS = 96
+
+
+def first_state(network: Network, intervals: int = 10, degree: int = 6, **options) -> tuple[Point, str]:
+    """Return a first state as `Network.first_point` does or, where it has none, by descent; and how it was found, in words.
+
+    Raises
+    ------
+    ProblemError
+        No state was found, or nothing determines it.
+    """
+    try:
+        return network.first_point(None, None, intervals, degree, **options)
+    except OutOfReach as error:
+        try:
+            guess = downhill(network, error.nearest)
+            point = network.state_near(guess, intervals=intervals, degree=degree, **options)
+        except (ContinError, ValueError):
+            raise error from None
+        return point, "from the drawing, by descent of its energy"
+
+
+def downhill(network: Network, point: Point) -> list:
+    """Return a guess, one function of s for each member: where the network of segments rests that begins at a point.
+
+    Raises
+    ------
+    ValueError
+        It cannot be joined, or does not come to rest.
+    """
+    from ribbon_model import descent, network_segments  # SciPy, which other first states do not need
+
+    drawing = network_segments.cut(network, point.system, point.x, _SEGMENTS)
+    chain = replace(drawing, numbers={**drawing.numbers, ASSEMBLY: 1.0}).moved(np.zeros(drawing.size))
+    way = descent.descend(chain, longest=descent.LONGEST / max(member.length for member in network.members.values()))
+    if not way.rests:
+        raise ValueError("the network of segments does not come to rest")
+    return [functools.partial(_at, piece) for piece in way.end.pieces]
+
+
+def _at(piece: Piece, s: float) -> np.ndarray:
+    """Return quaternion and place (7,) of a strip of segments at a distance from its beginning, on straight lines."""
+    place = s / piece.segment
+    number = min(int(place), len(piece.strains) - 1)
+    part, both = place - number, slice(number, number + 2)
+    q = quaternions(piece.axes[both].swapaxes(1, 2))
+    q[1] *= np.sign(q[0] @ q[1])
+    state = np.hstack([q, piece.place + piece.centreline[both]])
+    state = (1 - part) * state[0] + part * state[1]
+    state[:4] /= np.linalg.norm(state[:4])
+    return state
