@@ -13,7 +13,7 @@ from contin import ContinError, MeshControl, Point
 from contin.lowlevel import Collocation, Continuation
 from ribbon_model.changed_supports import held_at, with_supports
 from ribbon_model.ends import ANGLES
-from ribbon_model.network import ASSEMBLY, MOVES
+from ribbon_model.network import ASSEMBLY, FOLLOWER, MOVES
 from ribbon_model.network_first import first_state
 
 #: Axes of the drawing.
@@ -139,6 +139,8 @@ class NetworkStage(OpenStage):
             return f"{what}, once its support has changed", what.removeprefix("dead ")
         if name in network.loads:
             return f"number of the load {name}", name
+        if name == FOLLOWER:
+            return "pressure that stays normal to the strips, per length", "pressure that follows"
         if name == ASSEMBLY:
             return "part of natural strains, loads, gaps and turns of joints that acts", "assembly"
         if name == "floating":

@@ -87,6 +87,16 @@ def test_a_closed_strip_with_a_phase(run):
     assert change == [0, 1]
 
 
+def test_loads_that_follow_have_no_index(root, tmp_path):
+    """The scene of a hanging loop, under a pressure that follows it."""
+    text = (root / "configs" / "network_weight.yaml").read_text("utf-8").replace("weight", "follower_pressure")
+    path, display = tmp_path / "result.h5", Display(silent=True)
+    assert run_scene(parse(text.replace("to: 400.0", "to: 20.0"), "scene.yaml"), path, display) == "complete"
+    branch = read_branch(path)
+    assert set(branch.points["index"]) == {-1}
+    assert branch.columns.all["follower_pressure"].words == "pressure that stays normal to the strips, per length"
+
+
 def test_a_phase_of_a_network_that_is_held(root):
     text = (root / "configs" / "network_loop.yaml").read_text("utf-8")
     with pytest.raises(ConfigError, match="phase: a network that is held does not shift"):
