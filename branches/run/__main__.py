@@ -137,7 +137,10 @@ def _check_search(scene) -> None:
     if first.KIND == "network" or (scene.many and first.KIND != "closed strip"):
         raise ConfigError("--search: is for a scene of one open strip, or of closed strips")
     if first.KIND == "closed strip" and not first.zeros.get("kappa_n"):
-        raise ConfigError("--search: closed strips are searched at labelled values of kappa_n: zeros: {kappa_n: [...]}")
+        raise ConfigError(
+            "--search: closed strips are searched at labelled values of kappa_n; the scene has none: "
+            "add some, as with --set 'zeros={kappa_n: [-20, 2]}'"
+        )
 
 
 def _tell_further(scene, path, display, options) -> None:
