@@ -23,6 +23,7 @@ from .results.cubic import hermite, through
 from .results.phase_response import PhaseResponse
 from .results.point import point_of
 from .results.spectrum import Spectrum
+from .search.field_starts import oscillation
 from .search.further import Searched, further
 from .search.trace import follow
 from .shown import shown
@@ -31,6 +32,6 @@ __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE",
     "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
     "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
-    "interpolation", "least", "locate_branch_point", "minimum", "point_of", "read_columns", "root", "shown",
+    "interpolation", "least", "locate_branch_point", "minimum", "oscillation", "point_of", "read_columns", "root", "shown",
     "temporary_name", "through", "write_whole",
 ]  # fmt: skip

@@ -24,6 +24,7 @@ from contin.results.branch import Branch
 from contin.results.point import Point, underlying
 from contin.search.connection_starts import from_non_central, leaves_saddle_node
 from contin.search.cycle_starts import switched, switches
+from contin.search.field_starts import begins_oscillations, oscillation
 
 #: A branch point lies no further from where folds meet it, relative to 1 + its size: both are located to 1e-9 or better.
 _HERE = 1e-5
@@ -97,6 +98,12 @@ def _first(
     if branch == 1 and switches(start):
         cycles, x, along = switched(start, settings.mesh.min_intervals, free)
         return cycles, x, way * along, True
+    if branch == 1 and begins_oscillations(start):
+        first, along = oscillation(start)
+        oscillations: Any = first.system
+        if free is not None and checks.names("free", free) != oscillations.free:
+            raise ProblemError(f"free: must be left out, or {', '.join(oscillations.free)}, with which oscillations begin")
+        return oscillations, first.x, way * along, True
     if branch == 1 and leaves_saddle_node(start):
         if free is not None:
             raise ProblemError("free: the curve that leaves at NCH has the parameters of the one it was found on; leave it out")
@@ -174,11 +181,6 @@ def _tangent(start: Point, system: Discretization, branch: int) -> Array:
     """
     known = finding_of(start.details)
     if not known.is_branch_point:
-        if branch == 1 and start.label == Label.HOPF and start.system.intervals and not start.system.is_cycle:
-            raise ProblemError(
-                "branch: time-periodic states of a field begin at this Hopf point, and are not followed; replace derivatives "
-                "by x with differences, and state the values at nodes as an AlgebraicProblem: its Hopf points start cycles"
-            )
         first = "0 or 1" if switches(start) else "0"
         labelled = f"a point labelled {start.label or 'nothing'!r}"
         raise ProblemError(f"branch: {branch} must be {first} at {labelled}; other branches begin at BP, HB and PD")
