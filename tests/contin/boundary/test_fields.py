@@ -398,9 +398,6 @@ def test_what_does_not_move_has_no_spectrum_and_cycles_of_fields_are_refused():
     still = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -u.u), dirichlet, ["u", "v"], {})
     with pytest.raises(ProblemError, match="rates="):
         contin.solve(still, [0.0, 0.0]).spectrum()
-    point = contin.trace(uniform(4.9), free=["b"], limits={"b": (4.9, 5.05)}).labelled("HB")[0]
-    with pytest.raises(ProblemError, match="time-periodic states of a field"):
-        contin.trace(point, branch=1)
 
 
 # --- independent computations --------------------------------------------------------------------------------------------

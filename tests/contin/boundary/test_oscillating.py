@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import contin
+from contin.boundary.oscillating import oscillating
 from contin.lowlevel import oscillation
 
 DX, DY = 0.008, 0.004
@@ -106,3 +107,14 @@ def test_what_is_refused(hopf):
     still = contin.trace(contin.solve(FIELD, [2.0, 0, 2.45, 0]), free=["b"], limits={"b": (4.9, 5.0)})[-1]
     with pytest.raises(contin.ProblemError, match="is no Hopf point of a field"):
         oscillation(still)
+
+
+def test_fields_with_integral_conditions_are_refused():
+    """The mass of this field is given, and its multiplier follows: no oscillations are stated for it."""
+    held = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.da, p.w * u.b - p.r * u.a - p.m, u.db, -p.w * u.a - p.r * u.b),
+        lambda a, b, p: (a.da, b.da, a.db, b.db), ["a", "da", "b", "db"], {"r": -0.1, "w": 2.0, "m": 0.0},
+        integrals=lambda t, u, p: (u.a,), rates={"da": lambda t, u, w, p: w.a, "db": lambda t, u, w, p: w.b},
+    )  # fmt: skip
+    with pytest.raises(contin.ProblemError, match="fields without integral conditions"):
+        oscillating(held, {})
