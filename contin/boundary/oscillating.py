@@ -12,7 +12,7 @@ The error of the M times falls exponentially with M. No estimate contains it: mo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,6 +91,22 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
         known = values(*list(p)[:number])
         return [each for j in range(times) for each in boundary_of(at(a, j), at(b, j), known)]
 
+    stated = [f"{name}_{j}" for j in range(times) for name in names]
+    return OscillatingField(
+        rhs,
+        boundary,
+        stated,
+        {**field.parameters, PERIOD: 1.0},
+        _phase_condition(phase, count, times),
+        field.domain,
+        _columns(field, list(phase), times),
+        field=field,
+        times=times,
+    )
+
+
+def _phase_condition(phase: Mapping[int, tuple[Any, Any]], count: int, times: int) -> Function:
+    """Return the integrand of the phase condition."""
     waves = [(math.cos(2 * math.pi * j / times), math.sin(2 * math.pi * j / times)) for j in range(times)]
 
     def integrals(t: float, u: Named, p: Named) -> Any:
@@ -101,10 +117,18 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
             total = total - real(t) * sine - imaginary(t) * cosine
         return (total,)
 
+    return integrals
+
+
+def _columns(field: BoundaryValueProblem, moving: Sequence[int], times: int) -> dict[str, Function]:
+    """Return the functionals of an `OscillatingField`."""
+    names, own = field.state_names, tuple(field.parameters)
+    state, values, count, number = named_values(names), named_values(own), len(names), len(own)
+
     def mean_of(function: Function) -> Function:
         def functional(t: float, u: Named, p: Named) -> Any:
             known = values(*list(p)[:number])
-            return sum(function(t, at(u, j), known) for j in range(times)) / times
+            return sum(function(t, state(*list(u)[j * count : (j + 1) * count]), known) for j in range(times)) / times
 
         return functional
 
@@ -116,11 +140,8 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
 
         return functional
 
-    functionals = {name: mean_of(function) for name, function in field.functionals.items()}
-    functionals |= {f"swing_{names[k]}": swing_of(k) for k in phase}
-    parameters: Mapping[str, float] = {**field.parameters, PERIOD: 1.0}
-    stated = [f"{name}_{j}" for j in range(times) for name in names]
-    return OscillatingField(rhs, boundary, stated, parameters, integrals, field.domain, functionals, field=field, times=times)
+    found = {name: mean_of(function) for name, function in field.functionals.items()}
+    return found | {f"swing_{names[k]}": swing_of(k) for k in moving}
 
 
 def _differentiation(times: int) -> Array:
