@@ -7,7 +7,6 @@ test_store (file-format.md) and test_other_programs (from-auto.md, from-xppaut.m
 import importlib
 import os
 import re
-import runpy
 import shlex
 import shutil
 import subprocess
@@ -165,11 +164,11 @@ def error_of_the_fold(scope, side):
 
 
 def _run(words):
-    """Run a program: the first time as a process, later within this one."""
+    """Run a program: a script or a module's first run as a process, later runs of a module within this one."""
     count = 2 if words[0] == "-m" else 1  # words that name the program
     program, arguments = " ".join(words[:count]), words[count:]
-    if program in started:
-        code, said = _main(words[:count])(arguments), "see what it printed"
+    if program in started and count == 2:
+        code, said = _main(words[1])(arguments), "see what it printed"
     else:
         started.add(program)
         environment = {**os.environ, "PYTHONPATH": str(PROJECT)}
@@ -178,12 +177,10 @@ def _run(words):
     assert code == 0, f"{shlex.join(words)}: {said}"
 
 
-def _main(program):
-    """The function behind a program: ``-m package.module``, ``-m package`` or a script."""
-    if program[0] != "-m":
-        return runpy.run_path(program[0])["main"]
-    module = importlib.import_module(program[1])
-    return importlib.import_module(f"{program[1]}.__main__").main if hasattr(module, "__path__") else module.main
+def _main(name):
+    """The function behind ``-m package.module`` or ``-m package``."""
+    module = importlib.import_module(name)
+    return importlib.import_module(f"{name}.__main__").main if hasattr(module, "__path__") else module.main
 
 
 def test_the_python_of_the_readme_runs(capsys):
