@@ -25,11 +25,9 @@ from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMPED, FREE, HINGED, JOINT
 from ribbon_model.network import BALL, HINGE, MOVES, POTENTIALS, RIGID, START, JointEnd, Network
 from ribbon_model.second_variation import cross_matrix
-from ribbon_model.segments import Chain
+from ribbon_model.segments import Chain, moved
 from ribbon_model.shape import frames
 
-#: Tolerance of the conditions, the most Newton steps to it, and a violation from which none leads back.
-_HELD, _STEPS, _FAR = 1e-12, 12, 1.0
 #: Fewest segments of a strip.
 _FEWEST = 12
 
@@ -397,15 +395,10 @@ class NetworkChain:
         ValueError
             The conditions cannot be met nearby.
         """
-        chain = self._changed(change)
-        for _ in range(_STEPS):
-            missed = np.abs(chain._missed).max()
-            if missed < _HELD:
-                return chain
-            if not missed < _FAR:
-                break
-            chain = chain._changed(-np.linalg.lstsq(chain._slopes, chain._missed, rcond=None)[0])
-        raise ValueError("the conditions at joints and supports cannot be met by a small change of the strains")
+        found = moved(self, change, lambda chain: chain._missed, lambda chain: chain._slopes)
+        if found is None:
+            raise ValueError("the conditions at joints and supports cannot be met by a small change of the strains")
+        return found
 
     def _changed(self, change) -> NetworkChain:
         pieces = []

@@ -22,11 +22,8 @@ from ribbon_model.ends import ANGLES, CLAMPED, HINGED, JOINT, PLACE
 from ribbon_model.loads import FORCES, STROKE
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.second_variation import cross_matrix
-from ribbon_model.segments import Chain
+from ribbon_model.segments import Chain, moved
 from ribbon_model.shape import frames
-
-#: Tolerance of the conditions at the last end, the most Newton steps to it, and a violation from which none leads back.
-_HELD, _STEPS, _FAR = 1e-12, 12, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,15 +221,10 @@ class OpenChain(Chain):
         ValueError
             The conditions cannot be met nearby.
         """
-        chain = self._changed(change)
-        for _ in range(_STEPS):
-            missed = np.abs(chain.closure).max(initial=0.0)
-            if missed < _HELD:
-                return chain
-            if not missed < _FAR:
-                break
-            chain = chain._changed(-np.linalg.lstsq(chain.held_slopes, chain.closure, rcond=None)[0])
-        raise ValueError("the conditions at the end cannot be met by a small change of the strains")
+        found = moved(self, change, lambda chain: chain.closure, lambda chain: chain.held_slopes)
+        if found is None:
+            raise ValueError("the conditions at the end cannot be met by a small change of the strains")
+        return found
 
     def _changed(self, change) -> OpenChain:
         turns, strains = self._turns.shape[1], self.strains.copy()

@@ -9,9 +9,10 @@ with omega_2 = 0 the unknowns are omega_1 and omega_3.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,8 +22,10 @@ from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
 
-_CLOSED = 1e-12  # tolerance of the conditions of closure
+C = TypeVar("C")
 
+#: Tolerance of the conditions that a chain meets, the most Newton steps to it, and a violation from which none leads back.
+_MET, _STEPS, _FAR = 1e-12, 12, 1.0
 # in powers of z = p**2: sin(p)/p, f = (1 - cos p)/p**2, 2 f', 4 f'', g = (p - sin p)/p**3, 2 g', 4 g''; exact for |p| < pi
 _SERIES = np.array([[(-1) ** k / math.factorial(2 * k + i) for k in range(15)] for i in (1, 2, 3)])
 _BY_Z = np.diag(np.arange(1.0, 15), -1)  # a row of coefficients times this gives those of the derivative
@@ -282,15 +285,12 @@ class Strip(Chain):
         ValueError
             It cannot be closed.
         """
-        strip = self._changed(change)
-        for _ in range(12):
-            if np.abs(strip.closure).max() < _CLOSED:
-                return strip
-            if not np.abs(strip.closure).max() < 1.0:
-                break
-            slopes = strip.closure_slopes[:, :, strip.free].reshape(6, -1)
-            strip = strip._changed(-np.linalg.lstsq(slopes, strip.closure, rcond=None)[0])
-        raise ValueError("the strip cannot be closed by a small change of its strains")
+        found = moved(
+            self, change, lambda strip: strip.closure, lambda strip: strip.closure_slopes[:, :, strip.free].reshape(6, -1)
+        )
+        if found is None:
+            raise ValueError("the strip cannot be closed by a small change of its strains")
+        return found
 
     def along(self, stations) -> tuple[np.ndarray, np.ndarray]:
         """Return the directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
@@ -317,6 +317,22 @@ class Strip(Chain):
         strains = self.strains.copy()
         strains[:, self.free] += np.reshape(change, (len(strains), -1))
         return replace(self, strains=strains)
+
+
+def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[[C], np.ndarray]) -> C | None:
+    """Return a chain with its unknowns changed by (n,), and then by the least that meets conditions again; None if none does.
+
+    ``missed`` are the values (c,) of the conditions, which vanish where they are met, ``slopes`` their derivatives (c, n).
+    """
+    chain = chain._changed(change)
+    for _ in range(_STEPS):
+        violation = np.abs(missed(chain)).max(initial=0.0)
+        if violation < _MET:
+            return chain
+        if not violation < _FAR:
+            break
+        chain = chain._changed(-np.linalg.lstsq(slopes(chain), missed(chain), rcond=None)[0])
+    return None
 
 
 def discretized(equilibrium: Equilibrium, segments: int) -> Strip:

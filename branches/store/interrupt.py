@@ -29,13 +29,13 @@ class _State:
     line = "interrupted"
     held = 0
     unwinding = 0
-    asked = False
+    asked = raised = False
     last: list[Callable[[], object]] = []  # what is called before the process ends
 
 
 def begin(kept: str = "") -> None:
     """Handle Ctrl-C from now on, unless the shell ignores it; ``kept`` says what an interrupted command keeps."""
-    _State.process = os.getpid()
+    _State.process, _State.raised = os.getpid(), False
     change(kept)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, leave)
@@ -55,22 +55,27 @@ def run(main: Callable[[], int]) -> int:
     """Call the ``main`` of a command; return its exit code, or that of an interrupted command.
 
     What contin cannot do at all, as with a variable of the environment that it does not know, is one line and the exit code 2.
+    Compiled code of other libraries may make another error of Ctrl-C: what comes after it is the interruption.
     """
     try:
         return main()
-    except Exception as error:
+    except (Exception, KeyboardInterrupt) as error:
+        if _State.raised or isinstance(error, KeyboardInterrupt):
+            return _interrupted()
         from contin import ContinError  # takes 20 ms, and is needed here only
 
         if not isinstance(error, ContinError):
             raise
         print(f"error: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
-        _say()
-        if os.getpid() == _State.process:  # after exec() Python would end by the signal, not with the code
-            os._exit(EXIT_INTERRUPTED)
-        return EXIT_INTERRUPTED
+
+
+def _interrupted() -> int:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
+    _say()
+    if os.getpid() == _State.process:  # after exec() Python would end by the signal, not with the code
+        os._exit(EXIT_INTERRUPTED)
+    return EXIT_INTERRUPTED
 
 
 @contextlib.contextmanager
@@ -109,6 +114,7 @@ def leave(number, frame) -> None:
 def _act() -> None:
     if _State.unwinding:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        _State.raised = True
         raise KeyboardInterrupt
     for function in _State.last:
         function()

@@ -119,13 +119,19 @@ INDEX = Event("", "index", _index)
 
 
 def stability_of(point: SpecialPoint) -> Stability:
-    """Return what the second variation says of a point; at a special one, what vanishes there does not count."""
+    """Return what the second variation says of a point; at a special one, what vanishes there does not count.
+
+    It says nothing of a special point at which conditions depend on each other, as where a strip is pulled straight.
+    """
     trial, nullity = point.trial, nullity_of(point)
     if not nullity:
         index = trial.value(INDEX)
         return Stability() if np.isnan(index) else Stability(int(index))
     system: Any = trial.system
-    found = second_variation(system, trial.x)
+    try:
+        found = second_variation(system, trial.x)
+    except ProblemError:  # conditions depend on each other
+        return Stability()
     if found is None:
         return Stability()
     breaks = found.broken(nullity, system.problem.symmetries) if point.label == Label.BRANCH_POINT else ()

@@ -36,7 +36,7 @@ from contin.problems.vector_field import found_elsewhere
 
 #: A curve of cycles ends where they are smaller than this part of its largest reference; parameters differ from those of the
 #: equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
-_SHRUNK = 1e-2
+_SHRUNK = 3e-3
 
 T = TypeVar("T")
 

@@ -115,6 +115,20 @@ def test_code_that_unwinds_gets_an_exception_once(pressed, capfd):
     assert capfd.readouterr().err == "interrupted; nothing\n"
 
 
+def test_another_error_that_is_made_of_the_exception_is_no_traceback(pressed, capfd):
+    """Compiled code may do so: Matplotlib says "Invalid bounding box"."""
+
+    def main():
+        with interrupt.unwinding():
+            try:
+                pressed()
+            except KeyboardInterrupt:
+                raise RuntimeError("Invalid bounding box") from None
+
+    assert interrupt.run(main) == 130 and pressed.left == [130]
+    assert capfd.readouterr().err == "interrupted; nothing\n"
+
+
 def test_a_shell_that_ignores_ctrl_c_has_its_way():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     interrupt.begin("nothing")
