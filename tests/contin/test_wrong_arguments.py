@@ -105,6 +105,7 @@ def test_all_public_names_are_called(calls):
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::contin.errors.InterpretedWarning")
+@pytest.mark.filterwarnings("ignore:More than 20 figures")  # they stay open until the test ends
 def test_wrong_types(calls, tmp_path, monkeypatch):
     """Files that are not there are an OSError, and columns that are not there a KeyError, as documented."""
     monkeypatch.chdir(tmp_path)  # "text" is a file

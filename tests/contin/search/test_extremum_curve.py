@@ -116,7 +116,7 @@ def test_extrema_of_unknown_columns():
 def test_a_curve_of_extrema_follows_cycles_to_a_hopf_point():
     """Demo ``ops``: extrema of p3 on cycles, whose tangents turn far on the way; no branch point is suspected.
 
-    The curve ends where the cycles have a hundredth of their largest size. Parameters differ by the square of that from those
+    The curve ends where the cycles have .3 % of their largest size. Parameters differ by the square of that from those
     of Hopf points, where c2 c1 = c0 in lambda^3 + c2 lambda^2 + c1 lambda + c0, and the period from 2 pi / sqrt(c1).
     """
 
