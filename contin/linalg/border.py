@@ -5,9 +5,9 @@
                          [  c      0  ]  [ g_i ] = [ e_i ]           and w_i, the same of the transposed matrix.
 
 The numbers g vanish where A v = 0; dg_i = -w.dA v_i. Borders of the null vectors themselves are the best conditioned. Random
-ones come first, then those that their solutions make, which is inverse iteration. A run renews them where null vectors have
-turned, at accepted points only: made at an iterate of Newton's method that is far away they may point the other way, and the
-determinant of the equations changes its sign without a branch point.
+ones come first, then those that their solutions make, which is inverse iteration. Where they follow null vectors that turn,
+the determinant of the bordered matrix keeps its sign, and so do v, w and g. Rows about a whole space are renewed at accepted
+points of a run only: made at an iterate of Newton's method that is far away they may point the other way.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def null_vectors(
     weights: Array | float = 1.0,
     single: Callable[[Bordered], tuple[Any, Any]] = lambda found: (found.left[0], found.right[0]),
 ) -> tuple[Bordered, Borders]:
-    """Return the bordered matrix and its borders: those that are given, or new ones that fit its null vectors.
+    """Return the bordered matrix with borders that fit its null vectors, and these borders.
 
     Parameters
     ----------
@@ -107,16 +107,15 @@ def null_vectors(
     shape : tuple of int
         Lengths of b and c.
     borders : pair of ndarray, optional
-        By default, inverse iteration begins with random ones.
+        Those to begin with; random ones by default.
     weights : ndarray, shape (unknowns,)
         Of the inner product in which c is a vector.
     single : callable
         Returns the left and the right null vector, which may be complex.
     """
-    if borders is not None:
-        return bordered(*borders), borders
-    random = np.random.default_rng(11)
-    borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
+    if borders is None:
+        random = np.random.default_rng(11)
+        borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
     found, root = bordered(*borders), np.sqrt(weights)
     for _ in range(_ROUNDS):
         vectors = left, right = single(found)
