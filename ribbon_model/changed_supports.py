@@ -15,10 +15,9 @@ from contin import Point
 from contin.lowlevel import Collocation
 from ribbon_model import ends
 from ribbon_model.changed_ends import balanced, held_angles
-from ribbon_model.ends import ANGLES, FREE, FREE_END, HINGED, End, product
-from ribbon_model.equilibrium import directors
+from ribbon_model.ends import ANGLES, FREE, FREE_END, HINGED, End
 from ribbon_model.loads import FORCES, replacing_loads
-from ribbon_model.network import MOVES, START, Load, Network
+from ribbon_model.network import MOVES, Load, Network
 
 #: Behind the name of a joint: its dead forces along the axes of the drawing, and its dead moment.
 _NAMES = dict(zip((*FORCES, "moment"), ("force_x", "force_y", "force_z", "moment")))
@@ -96,17 +95,8 @@ def held_at(network: Network, point: Point, joint: str, end: End = FREE_END) -> 
     >>> abs(held_at(beam, state, "B")["B_dz"]) < 1e-12
     True
     """
-    first = network.joints[joint].members[0]
-    number, member = list(network.members).index(first.member), network.members[first.member]
-    here, at = (0, 0.0) if first.end == START else (-1, member.length)
-    drawn = member.drawn([at])[0]
-    q = point.system.states(point.x)[here, list(network.problem.pieces[number].at[:4])]
-    before, moves = point.parameters, tuple(f"{joint}_{move}" for move in MOVES)
-    away = network.place(point, joint) - drawn[4:] - np.array(first.arm) @ np.array(directors(*drawn[:4])).reshape(3, 3)
-    angles = tuple(f"{joint}_{angle}" for angle in ANGLES)
+    before, away = point.parameters, network.place(point, joint) - network.drawn_place(joint)
+    moves, angles = (tuple(f"{joint}_{name}" for name in names) for names in (MOVES, ANGLES))
     known = [before.get(angle, 0.0) for angle in angles] if angles[0] in before else None
-    angle = before.get(first.angle, 0.0) if isinstance(first.angle, str) else first.angle
-    frame = product(q, (drawn[0], *(-x for x in drawn[1:4])))
-    frame = product(frame, (np.cos(angle / 2), *(-np.sin(angle / 2) * x for x in first.axis)))
     now = end if end.rotation != FREE else ends.CLAMP
-    return dict(zip(moves, map(float, away))) | dict(zip(angles, held_angles(now, frame, known)))
+    return dict(zip(moves, map(float, away))) | dict(zip(angles, held_angles(now, network.frame(point, joint), known)))

@@ -387,28 +387,37 @@ class Network:
         always = [name for name in self.known if name not in (*POTENTIALS, FOLLOWER)]
         values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
         own = {
-            self._full(name, number): value
+            self.full_name(name, number): value
             for name, section in self.sections.items() for number, value in section.parameters.items()
         }  # fmt: skip
         return values | own | {ASSEMBLY: 1.0}
 
-    def _full(self, section: str, number: str) -> str:
+    def full_name(self, section: str, number: str) -> str:
         """Return the name of a number of a section among all."""
         return number if len(self.sections) == 1 else f"{number}_{section}"
 
     # --- geometry of the drawing --------------------------------------------------------------------------------------
 
-    def _drawn(self, each: JointEnd) -> np.ndarray:
+    def drawn(self, each: JointEnd) -> np.ndarray:
         """Return quaternion and place (7,) of an end as it is drawn."""
         member = self.members[each.member]
         return member.drawn([0.0 if each.end == START else member.length])[0]
+
+    def drawn_axes(self, each: JointEnd) -> np.ndarray:
+        """Return the directors of an end as it is drawn, as rows (3, 3)."""
+        return _axes(self.drawn(each))
+
+    def drawn_place(self, joint: str) -> np.ndarray:
+        """Return the place (3,) of a joint as it is drawn."""
+        first = self.joints[joint].members[0]
+        return _at_arm(self.drawn(first), first.arm)
 
     @functools.cached_property
     def _gaps(self) -> dict[tuple[str, int], Vector]:
         """Gaps of the drawing: from the first end of a joint to each of the others, where there are any."""
         found = {}
         for name, joint in self.joints.items():
-            places = [_at_arm(self._drawn(each), each.arm) for each in joint.members]
+            places = [_at_arm(self.drawn(each), each.arm) for each in joint.members]
             for number, place in enumerate(places):
                 if np.linalg.norm(place - places[0]) > LOOSE:
                     found[name, number] = tuple(map(float, place - places[0]))
@@ -456,7 +465,7 @@ class Network:
     def _hamiltonian(self, member: Member, place: int) -> Callable:
         section, length, name = self.sections[member.section], member.length, member.section
         complementary, own = section.hamiltonian(), tuple(section.parameters)
-        numbers, full = namedtuple("Numbers", own), [self._full(name, number) for number in own]
+        numbers, full = namedtuple("Numbers", own), [self.full_name(name, number) for number in own]
         homogeneous, potential = section.homogeneous, self._distributed()
         phases, count = self.phases, len(self.members)
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
@@ -526,24 +535,20 @@ class Network:
         order = list(self.members)
         known = []
         for each in joint.members:
-            known.append((order.index(each.member), each, _numbers(self._drawn(each)[:4])))
+            known.append((order.index(each.member), each, _numbers(self.drawn(each)[:4])))
 
         def read(a, b, p):
             found = []
             for number, each, drawn in known:
                 x = (a if each.end == START else b)[number]
-                frame = _joint_frame(x[:4], drawn)
-                if each.angle != 0:
-                    half = p.assembly * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
-                    frame = product(frame, (math.cos(half), *(-math.sin(half) * part for part in each.axis)))
-                found.append((frame, _moved(x, each.arm)))
+                found.append((_joint_frame(x[:4], drawn, each, p), _moved(x, each.arm)))
             return found
 
         return read
 
     def _prescribing(self, name: str, end: End) -> tuple[Callable, Callable, Callable, Callable]:
         """Return prescribed frame and place of a joint as functions of p, and the conditions for both."""
-        drawn = _at_arm(self._drawn(self.joints[name].members[0]), self.joints[name].members[0].arm)
+        drawn = self.drawn_place(name)
         along, angles = (tuple(f"{name}_{each}" for each in names) for names in (MOVES, ANGLES))
         numbers, turned = self._prescribed, end.rotation != FREE
 
@@ -561,7 +566,7 @@ class Network:
         drawn, axes = _numbers(member.drawn([0.0])[0]), self._free_turns
 
         def conditions(a):
-            turned = _joint_frame(a[0][:4], drawn[:4])[1:]
+            turned = _from_drawing(a[0][:4], drawn[:4])[1:]
             return [x - y for x, y in zip(a[0][4:7], drawn[4:])] + [ends.along(axis, turned) for axis in axes]
 
         return conditions
@@ -589,8 +594,7 @@ class Network:
         for number, load in self.loads.items():
             for name, direction, arm in load.forces:
                 first = self.joints[name].members[0]
-                back = np.array(directors(*self._drawn(first)[:4])).reshape(3, 3)
-                on_directors = tuple(map(float, np.array(first.arm) + back @ np.array(arm, dtype=float)))
+                on_directors = _numbers(np.array(first.arm) + self.drawn_axes(first) @ np.array(arm, dtype=float))
                 forces.append(
                     (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
                 )
@@ -625,7 +629,7 @@ class Network:
         found = []
         for number, name, direction, arm in loaded:
             first = self.joints[name].members[0]
-            own = tuple(_numbers(np.array(directors(*self._drawn(first)[:4])).reshape(3, 3) @ v) for v in (direction, arm))
+            own = tuple(_numbers(self.drawn_axes(first) @ v) for v in (direction, arm))
             place, end = list(self.members).index(first.member), 0 if first.end == START else 1
             found.append((number, place, end, own[0], tuple(x + y for x, y in zip(first.arm, own[1]))))
 
@@ -793,7 +797,7 @@ class Network:
         Places have the size of the longest member, forces and moments that of the smallest stiffness.
         """
         stiffness = [
-            self.parameters[self._full(name, number)]
+            self.parameters[self.full_name(name, number)]
             for name, section in self.sections.items() for number in section.stiffnesses
         ]  # fmt: skip
         force, length = min(stiffness, default=1.0), max(member.length for member in self.members.values())
@@ -811,7 +815,7 @@ class Network:
     @property
     def _of_sections(self) -> list[str]:
         """Names of all numbers of the sections."""
-        return [self._full(name, number) for name, section in self.sections.items() for number in section.parameters]
+        return [self.full_name(name, number) for name, section in self.sections.items() for number in section.parameters]
 
     # --- where laws end -----------------------------------------------------------------------------------------------
 
@@ -820,7 +824,7 @@ class Network:
         found = []
         for (name, member), places in zip(self.members.items(), self.places):
             section = self.sections[member.section]
-            names = {number: self._full(member.section, number) for number in section.parameters}
+            names = {number: self.full_name(member.section, number) for number in section.parameters}
             place = law_end.Place(functools.partial(self._strains_of, name), tuple(places), names)
             found.append((section, law_end.tests(section, place)))
         return found
@@ -881,8 +885,7 @@ class Network:
                 for where, factor in load.moments:
                     if where == name:
                         frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
-                        axes = np.array(directors(*frame)).reshape(3, 3)
-                        moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ axes)
+                        moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ _axes(frame))
             found[name] = force, moment
         if self.floats:
             first = JointEnd(next(iter(self.members)))
@@ -915,6 +918,12 @@ class Network:
         first = self.joints[joint].members[0]
         return _at_arm(self._state(point, first)[:7], first.arm)
 
+    def frame(self, point: Point, joint: str) -> tuple:
+        """Return the quaternion of the joint frame, the identity in the drawing."""
+        first = self.joints[joint].members[0]
+        q, drawn = (_numbers(state[:4]) for state in (self._state(point, first), self.drawn(first)))
+        return _joint_frame(q, drawn, first, SimpleNamespace(**point.parameters))
+
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:
         """Return quaternion, place, and their multipliers (14,) at an end."""
         number = list(self.members).index(each.member)
@@ -923,8 +932,7 @@ class Network:
 
     def _arm(self, point: Point, each: JointEnd, arm: Vector) -> np.ndarray:
         """Return an arm on the axes of the drawing, fixed on an end, as it has turned."""
-        before, now = (np.array(directors(*q)).reshape(3, 3) for q in (self._drawn(each)[:4], self._state(point, each)[:4]))
-        turned: np.ndarray = (before @ np.array(arm, dtype=float)) @ now
+        turned: np.ndarray = (self.drawn_axes(each) @ np.array(arm, dtype=float)) @ _axes(self._state(point, each))
         return turned
 
     def potential(self, point: Point) -> float:
@@ -958,9 +966,23 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
     return [ends.along(vector, turned) for vector in pair]
 
 
-def _joint_frame(q, drawn: Quaternion) -> tuple:
-    """Return J = q conj(q0) of an end that is drawn with the quaternion q0."""
+def _from_drawing(q, drawn: Quaternion) -> tuple:
+    """Return q conj(q0) of an end that is drawn with the quaternion q0."""
     return product(q, (drawn[0], *(-x for x in drawn[1:])))
+
+
+def _joint_frame(q, drawn: Quaternion, each: JointEnd, p) -> tuple:
+    """Return J, the same less the angle by which the end is turned before it is joined."""
+    frame = _from_drawing(q, drawn)
+    if each.angle == 0:
+        return frame
+    half = p.assembly * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
+    return product(frame, (math.cos(half), *(-math.sin(half) * part for part in each.axis)))
+
+
+def _axes(state: np.ndarray) -> np.ndarray:
+    """Return the directors of a state that begins with the quaternion, as rows (3, 3)."""
+    return np.array(directors(*state[:4])).reshape(3, 3)
 
 
 def _moved(x, arm: Vector) -> list:

@@ -222,7 +222,7 @@ class NetworkChain:
             for joint, direction, arm in load.forces:
                 first = self.network.joints[joint].members[0]
                 end = self._end(first)
-                turned = self._frame_of_end(end) @ self._drawn(first)[1].T @ np.array(arm)
+                turned = self._frame_of_end(end) @ self.network.drawn_axes(first) @ np.array(arm)
                 found.append((replace(end, arm=end.arm + turned), self.numbers[number] * np.array(direction)))
         return found
 
@@ -252,17 +252,11 @@ class NetworkChain:
         place: np.ndarray = piece.place + end.arm + (piece.centreline[-1] if end.last else 0.0)
         return place
 
-    def _drawn(self, each: JointEnd) -> tuple[np.ndarray, np.ndarray]:
-        """Return place and directors (columns) of an end as it is drawn."""
-        member = self.network.members[each.member]
-        state = member.drawn([0.0 if each.end == START else member.length])
-        return state[0, 4:], frames(state)[0].T
-
     def _joint_frame(self, each: JointEnd) -> np.ndarray:
         """Return the rotation (3, 3) of an end from the drawing, before which it is turned by its angle."""
         angle = self.numbers[each.angle] if isinstance(each.angle, str) else each.angle
         back = Rotation.from_rotvec(-angle * np.array(each.axis)).as_matrix()
-        return self._frame_of_end(self._end(each)) @ self._drawn(each)[1].T @ back
+        return self._frame_of_end(self._end(each)) @ self.network.drawn_axes(each) @ back
 
     def _hinge(self, name: str) -> tuple[np.ndarray, float, np.ndarray]:
         """Return the frame of a support, turned with its hinge, that angle, and the axis of the hinge."""
@@ -299,8 +293,8 @@ class NetworkChain:
     def _of_supports(self) -> Iterator[_Condition]:
         for name, end in self.network.held.items():
             each = self.network.joints[name].members[0]
-            here, (place, drawn) = self._end(each), self._drawn(each)
-            to = place + drawn @ np.array(each.arm) + [self.numbers.get(f"{name}_{move}", 0.0) for move in MOVES]
+            here, to = self._end(each), self.network.drawn_place(name)
+            to = to + [self.numbers.get(f"{name}_{move}", 0.0) for move in MOVES]
             if end.held:
                 held = np.array(end.held)
                 yield _Condition(False, held, held @ (self._place(here) - to), here)
@@ -310,8 +304,8 @@ class NetworkChain:
                 yield _Condition(True, rows @ frame.T, rows @ _vector(frame.T @ self._joint_frame(each)), here)
         if self.network.floats:
             each = JointEnd(next(iter(self.network.members)))
-            here, (place, _) = self._end(each), self._drawn(each)
-            yield _Condition(False, np.eye(3), self._place(here) - place, here)
+            here = self._end(each)
+            yield _Condition(False, np.eye(3), self._place(here) - self.network.drawn(each)[4:], here)
             yield _Condition(True, np.eye(3), _vector(self._joint_frame(each)), here)
 
     @property
@@ -395,10 +389,8 @@ class NetworkChain:
         ValueError
             The conditions cannot be met nearby.
         """
-        found = moved(self, change, lambda chain: chain._missed, lambda chain: chain._slopes)
-        if found is None:
-            raise ValueError("the conditions at joints and supports cannot be met by a small change of the strains")
-        return found
+        failed = "the conditions at joints and supports cannot be met by a small change of the strains"
+        return moved(self, change, lambda chain: chain._missed, lambda chain: chain._slopes, failed)
 
     def _changed(self, change) -> NetworkChain:
         pieces = []
@@ -433,9 +425,8 @@ class _Acting:
 
 def _numbers(network: Network, section: str, numbers: Mapping[str, float]) -> SimpleNamespace:
     """Return the numbers of a section by their own names."""
-    several = len(network.sections) > 1
     own = network.sections[section].parameters
-    return SimpleNamespace(**{name: numbers[f"{name}_{section}" if several else name] for name in own})
+    return SimpleNamespace(**{name: numbers[network.full_name(section, name)] for name in own})
 
 
 def _vector(rotation: np.ndarray) -> np.ndarray:
@@ -479,11 +470,11 @@ def cut(network: Network, system: Collocation, x: np.ndarray, segments: int) -> 
     p = system.all_parameters(x)
     numbers, first = dict(zip(network.problem.parameters, p.tolist())), system.states(x)[0]
     whole, pieces = sum(member.length for member in network.members.values()), []
-    for (name, member), at in zip(network.members.items(), network.problem.pieces):
+    for (name, member), places in zip(network.members.items(), network.places):
         count = max(_FEWEST, round(segments * member.length / whole))
         middle = (np.arange(count) + 0.5) / count
         strains = network.strains_at(middle, system.evaluate(x, middle), p)[name]
-        section, own = network.sections[member.section], first[list(at.at[:7])]
+        section, own = network.sections[member.section], first[places[:7]]
         rigid = section.constrained and not getattr(_numbers(network, member.section, numbers), "softness", 0.0) > 0
         free = (0, 2) if rigid else (0, 1, 2)
         pieces.append(Piece(member.length, strains, frames(own[None])[0].T, own[4:], free))

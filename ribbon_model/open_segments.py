@@ -221,10 +221,8 @@ class OpenChain(Chain):
         ValueError
             The conditions cannot be met nearby.
         """
-        found = moved(self, change, lambda chain: chain.closure, lambda chain: chain.held_slopes)
-        if found is None:
-            raise ValueError("the conditions at the end cannot be met by a small change of the strains")
-        return found
+        failed = "the conditions at the end cannot be met by a small change of the strains"
+        return moved(self, change, lambda chain: chain.closure, lambda chain: chain.held_slopes, failed)
 
     def _changed(self, change) -> OpenChain:
         turns, strains = self._turns.shape[1], self.strains.copy()

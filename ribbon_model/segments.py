@@ -285,12 +285,13 @@ class Strip(Chain):
         ValueError
             It cannot be closed.
         """
-        found = moved(
-            self, change, lambda strip: strip.closure, lambda strip: strip.closure_slopes[:, :, strip.free].reshape(6, -1)
+
+        def slopes(strip: Strip) -> np.ndarray:
+            return strip.closure_slopes[:, :, strip.free].reshape(6, -1)
+
+        return moved(
+            self, change, lambda strip: strip.closure, slopes, "the strip cannot be closed by a small change of its strains"
         )
-        if found is None:
-            raise ValueError("the strip cannot be closed by a small change of its strains")
-        return found
 
     def along(self, stations) -> tuple[np.ndarray, np.ndarray]:
         """Return the directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
@@ -319,10 +320,15 @@ class Strip(Chain):
         return replace(self, strains=strains)
 
 
-def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[[C], np.ndarray]) -> C | None:
-    """Return a chain with its unknowns changed by (n,), and then by the least that meets conditions again; None if none does.
+def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[[C], np.ndarray], failed: str) -> C:
+    """Return a chain with its unknowns changed by (n,), and then by the least that meets conditions again.
 
     ``missed`` are the values (c,) of the conditions, which vanish where they are met, ``slopes`` their derivatives (c, n).
+
+    Raises
+    ------
+    ValueError
+        They cannot be met nearby: ``failed``.
     """
     chain = chain._changed(change)
     for _ in range(_STEPS):
@@ -332,7 +338,7 @@ def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[
         if not violation < _FAR:
             break
         chain = chain._changed(-np.linalg.lstsq(slopes(chain), missed(chain), rcond=None)[0])
-    return None
+    raise ValueError(failed)
 
 
 def discretized(equilibrium: Equilibrium, segments: int) -> Strip:

@@ -13,7 +13,6 @@ from branches.draw.strip import View
 from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure
 from branches.store.open_branch import OpenBranch
 from ribbon_model.ends import CLAMPED, HINGED, unit
-from ribbon_model.equilibrium import directors
 from ribbon_model.network import HINGE, RIGID, START, Joint, JointEnd, Network
 
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
@@ -85,7 +84,7 @@ def fixtures(network: Network) -> Iterator[Fixture]:
         for follows, forces in ((False, load.forces), (True, load.followers)):
             for name, direction, arm in forces:
                 first = network.joints[name].members[0]
-                frame, at = _frame(network, first), (list(network.members).index(first.member), first.end != START)
+                frame, at = network.drawn_axes(first), (list(network.members).index(first.member), first.end != START)
                 there = tuple(map(float, np.array(first.arm) + frame @ np.array(arm)))
                 axis = unit("force", frame @ np.array(direction) if follows else direction)
                 yield Fixture(*at, there, axis, ARROW, number=number, in_space=not follows)
@@ -103,15 +102,8 @@ def fixtures(network: Network) -> Iterator[Fixture]:
 
 def _fixture(network: Network, each: JointEnd, form: str, axis, held: bool) -> Fixture:
     """Return a fixture at an end; ``axis`` is on the axes of the drawing, by default that along the width."""
-    own = (1.0, 0.0, 0.0) if axis is None else unit("axis", _frame(network, each) @ np.array(axis))
+    own = (1.0, 0.0, 0.0) if axis is None else unit("axis", network.drawn_axes(each) @ np.array(axis))
     return Fixture(list(network.members).index(each.member), each.end != START, each.arm, own, form, held)
-
-
-def _frame(network: Network, each: JointEnd) -> np.ndarray:
-    """Return the directors (rows) of an end as it is drawn."""
-    member = network.members[each.member]
-    state = member.drawn([0.0 if each.end == START else member.length])[0]
-    return np.array(directors(*state[:4])).reshape(3, 3)
 
 
 def _goes_on(network: Network, joint: Joint) -> bool:
@@ -120,5 +112,5 @@ def _goes_on(network: Network, joint: Joint) -> bool:
         return len(joint.members) == 1
     if any(each.angle != 0 or any(each.arm) for each in joint.members):
         return False
-    one, other = (_frame(network, each)[2] * (1 if each.end == START else -1) for each in joint.members)
+    one, other = (network.drawn_axes(each)[2] * (1 if each.end == START else -1) for each in joint.members)
     return len({network.members[each.member].section for each in joint.members}) == 1 and -one @ other > 1 - _STRAIGHT

@@ -28,7 +28,7 @@ from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.coefficient import Coefficient
 from contin.events.normal_forms import Form
-from contin.linalg.border import Bordered, fit, null_vectors
+from contin.linalg.border import Bordered, null_vectors
 
 #: The imaginary parts of null vectors count where that of the eigenvalue is larger than this; they vanish with it, and are
 #: divided by it. Ten times larger or smaller, the curves of the tests are the same.
@@ -113,11 +113,6 @@ class CriticalCurve(Defining):
         if r > _ALMOST_REAL * math.sqrt(self.kappa_size):
             return left[0, 0] + 1j / r * left[0, 1], right[0] + 1j * r * right[1]
         return left[0, 0], right[0]
-
-    def borders_fit(self, x: Array) -> bool:
-        """Return whether v and w have not turned away from the borders."""
-        form, found = self.at(x)
-        return fit(self.borders, self._single(x, found), form.weights)
 
     # --- the equations ---------------------------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.interpolated import meeting
-from contin.linalg.border import Bordered, fit, null_vectors
+from contin.linalg.border import Bordered, null_vectors
 
 #: w.F_mu is interpolated to the zero of w.F_lambda only where its first estimate there is below this part of its values at the
 #: ends of the step; the location decides. Ten times smaller, long steps miss the zero.
@@ -59,10 +59,6 @@ class FoldCurve(Defining):
         """Return v (size,) and w (equations of F,)."""
         found: Bordered = self.at(x)
         return found.right[0], found.left[0]
-
-    def borders_fit(self, x: Array) -> bool:
-        """Return whether v and w have not turned away from the borders."""
-        return fit(self.borders, self.null_vectors(x)[::-1], self.base.weights)
 
     def own_values(self, x: Array) -> Array:
         """Return g."""

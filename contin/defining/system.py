@@ -90,7 +90,7 @@ class Defining(Discretization):
         self.weights, self.state_size = np.append(base.weights, np.ones(self.own_unknowns)), base.state_size
         self.intervals, self.degree = base.intervals, base.degree
         self.scales, self.free_scales = base.scales, base.free_scales
-        #: What borders the singular matrix: about its null vectors. Made when first needed, renewed by `adapted`.
+        #: What borders the singular matrix: about its null vectors. Made when first needed, renewed where they have turned.
         self.borders: Any = None
         #: The size of the largest reference of the run, where solutions have one.
         self.largest = float(cast(Any, base).reference_size) if base.size_of_solutions is not None else 0.0
@@ -111,7 +111,7 @@ class Defining(Discretization):
         """Return what the own equations are made of."""
 
     def borders_fit(self, x: Array) -> bool:
-        """Return whether the borders are still close to the null vectors at x."""
+        """Return whether rows about a whole space are still close to it at x; single null vectors have theirs renewed there."""
         return True
 
     @abstractmethod

@@ -118,18 +118,12 @@ def null_vectors(
         borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
     found, root = bordered(*borders), np.sqrt(weights)
     for _ in range(_ROUNDS):
-        vectors = left, right = single(found)
-        if fit(borders, vectors, weights):
+        left, right = single(found)
+        if not min(cosine(borders[0], left), cosine(borders[1] / root, right * root)) < FITS:
             break
         borders = _largest_part(left), _largest_part(right * root) * root
         found = bordered(*borders)
     return found, borders
-
-
-def fit(borders: Borders, vectors: tuple[Numbers, Numbers], weights: Array | float = 1.0) -> bool:
-    """Return whether the left and the right null vector have not turned away from their borders."""
-    root, (left, right) = np.sqrt(weights), vectors
-    return not min(cosine(borders[0], left), cosine(borders[1] / root, right * root)) < FITS
 
 
 def rows_fit(tangents: Array, weights: Array) -> bool:

@@ -101,7 +101,7 @@ class Shooting:
                 end = both[self.order.index(each.member)][0 if each.end == START else 1]
                 angle = self.numbers.get(each.angle, 0.0) if isinstance(each.angle, str) else each.angle
                 turned = Rotation.from_rotvec(-angle * np.array(each.axis)).as_matrix()
-                frames.append(end.frame @ _frame(net._drawn(each)[:4]).T @ turned)
+                frames.append(end.frame @ _frame(net.drawn(each)[:4]).T @ turned)
                 places.append(end.place + end.frame @ each.arm)
                 ends.append(end)
                 joined.add((each.member, each.end))
@@ -125,7 +125,7 @@ class Shooting:
                 else:
                     found.append(apart)
             for number, given in net.loads.items():
-                turned = ends[0].frame @ _frame(net._drawn(joint.members[0])[:4]).T
+                turned = ends[0].frame @ _frame(net.drawn(joint.members[0])[:4]).T
                 for where, direction, arm in given.followers:
                     if where == name:
                         pull = turned @ direction * self.numbers[number]
@@ -149,7 +149,7 @@ class Shooting:
             return (
                 [place - self.held[0], Rotation.from_matrix(self.held[1].T @ frame).as_rotvec()] if floats else [force, moment]
             )
-        end, drawn = net.held[name], net._drawn(net.joints[name].members[0])
+        end, drawn = net.held[name], net.drawn(net.joints[name].members[0])
         moves = np.array([self.numbers.get(f"{name}_{x}", 0.0) for x in ("dx", "dy", "dz")])
         turns = prescribed(*(self.numbers.get(f"{name}_{x}", 0.0) for x in ("turn", "bend", "swing")))
         along = np.array(end.held).reshape(-1, 3)
@@ -177,7 +177,7 @@ class Shooting:
         if self.network.floats:
             each = next(iter(self.network.joints.values())).members[0]
             end = both[self.order.index(each.member)][0 if each.end == START else 1]
-            self.held = end.place + end.frame @ each.arm, end.frame @ _frame(self.network._drawn(each)[:4]).T
+            self.held = end.place + end.frame @ each.arm, end.frame @ _frame(self.network.drawn(each)[:4]).T
         return bases, x, both
 
     def slopes(self, bases: list[np.ndarray], x: np.ndarray, step: float, missed: np.ndarray | None = None) -> np.ndarray:

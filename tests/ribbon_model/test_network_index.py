@@ -86,7 +86,7 @@ class Dense:
         force, moment, arm = sign * state[11:14], sign * Shooting._moment(state), R @ each.arm
         move = self.moves[each.member, each.end] - _cross(arm) @ turn
         turned = Rotation.from_rotvec(-each.angle * np.array(each.axis)).as_matrix()
-        frame = R @ _frame(self.network._drawn(each)[:4]).T @ turned
+        frame = R @ _frame(self.network.drawn(each)[:4]).T @ turned
         return turn, move, frame, moment - np.cross(arm, force), -_turned_twice(force, arm)
 
     def _add(self, left: np.ndarray, matrix: np.ndarray, right: np.ndarray) -> None:
