@@ -71,6 +71,8 @@ from contin.results.point import Point
 FEWEST, MOST = 8, 128
 #: The length of a step, and its end.
 Handed = tuple[float, Trial]
+#: Where steps on a mesh begin: factors, their place in the lane, and what condensed matrices say there.
+_Begun = tuple[Factorization, int, int]
 #: Where the error of the mesh is above its tolerance already, as finer meshes do not lower it, steps whose errors grow by less
 #: than this factor want none. Ten times larger, errors of the mesh would grow unseen up to where the mesh is adapted next.
 _NO_WORSE = 2.0
@@ -257,12 +259,14 @@ class MeshLane(Lane):
         self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1])) for _ in range(2)]
         self._quotient, self._watched = _quotient(width), settings.branch_points
         self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
+        self._left: tuple[Array, _Begun] | None = None
 
     def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:
         """Return whether the lane is that of a system of the same run, with these settings."""
         if not (self.settings is settings and self.noisy == noisy and getattr(system, "workspace", None) is self._work):
             return False
-        self.system = system  # with another reference
+        if system is not self.system:  # it has another reference
+            self.system, self._left = system, None
         return True
 
     @staticmethod
@@ -275,12 +279,10 @@ class MeshLane(Lane):
         return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
     def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
-        values, known = self._work.values, self._begun(path, here)
-        if known is None:
+        values, begun = self._work.values, self._begun(path, here)
+        if begun is None:
             return 0
-        now, before, clear = 0, known, self._compared(known.room, 1)
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
-            return 0
+        before, now, clear = begun
         error = path.numbers[1, MESH_ERROR]
         poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
@@ -303,22 +305,33 @@ class MeshLane(Lane):
                     self._hand_over(path, number, abs(step), now)
                 return number - 2
             before = after
+        self._left = path.x[-1], (before, now, clear)
         return len(path.x) - 2
 
-    def _begun(self, path: Path, here: Trial) -> Factorization | None:
-        """Prepare steps from row 1 of a path, the point ``here``; return the factors there, None where they are not found."""
+    def _begun(self, path: Path, here: Trial) -> _Begun | None:
+        """Prepare steps from row 1 of a path, the point ``here``; return what is known there, None where that is not found.
+
+        It is what the steps of the call before have left, where they end there.
+        """
         _, factored, newton, report, amplitude, frame, *_ = self._rooms[0]
-        values = self._work.values
+        values, (left, self._left) = self._work.values, (self._left, None)
         conditions, targets = self.system.linear_conditions
         values.rows[: len(targets)], values.targets[: len(targets)] = conditions, targets
         values.rows[-1] = frame.weights * path.tangents[1]
         if amplitude.size:
             amplitude[:] = self.system.amplitude_row
-        if isinstance(here.factors, Factorization) and np.array_equal(values.at, here.x):
-            return here.factors
-        given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
-        done = one_call.correct_on_mesh(self._work, factored, *given)
-        return self._factors[0] if done == one_call.CONVERGED else None
+        if left is not None and np.array_equal(left[0], here.x):
+            return left[1]
+        factors = here.factors
+        if not (isinstance(factors, Factorization) and np.array_equal(values.at, here.x)):
+            given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
+            if one_call.correct_on_mesh(self._work, factored, *given) != one_call.CONVERGED:
+                return None
+            factors = self._factors[0]
+        clear = self._compared(factors.room, 1)
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
+            return None
+        return factors, 0, clear
 
     def _compared(self, factored: Factored, begins: int) -> int:
         """Return what condensed matrices say of a step that ends at a matrix."""
