@@ -20,7 +20,6 @@ from one count (`contin.core.scales`).
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -235,7 +234,7 @@ class _FirstPoint:
 
     def _modes(self, known: Array) -> Iterator[_Mode]:
         """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
-        left = np.ones(known.size, dtype=bool)
+        left = np.arange(known.size) != self.at  # the primary parameter is held: it takes part in no null vector
         while np.any(left & (known < USUAL[0])):
             mode = self._nearest(self.tangent, left)
             if mode is None:
@@ -338,20 +337,31 @@ class _FirstPoint:
         for _ in range(2):  # the sign is that of the first again
             again = self._changed(again, self.tangent, mode.order) / mode.rate
         parts, size = self._branch(mode)
-        others = self._branch(replace(mode, vector=again))[0]
-        pairs = zip(parts, itertools.chain(others, itertools.repeat(np.zeros_like(parts[0]))))
+        pairs = zip(parts, (largest for largest, _ in self._terms_along(replace(mode, vector=again))))
         return [np.where(np.abs(part - other) < _LASTS * part, part, 0.0) for part, other in pairs], size
 
     def _branch(self, mode: _Mode) -> tuple[list[Array], float]:
-        """Return the terms of the branch that leaves along a null vector v, x + a v + a^2 ..., and the size of a.
+        """Return the terms of the branch that leaves along a null vector v, and the size of a, both described below.
 
         At this size a term of higher order in a, there or at the singular point, is as large along v as the change of F_x v
         from here to the singular point. It is infinity where F is linear along v.
         """
-        v, size, parts, second = mode.vector, np.inf, [self.system.largest(mode.vector)], np.zeros_like(mode.vector)
-        for order in range(2, _HIGHEST + 1):
-            if order > 3 and np.isfinite(size):
+        size, parts = np.inf, []
+        for order, (largest, terms) in enumerate(self._terms_along(mode), 1):
+            size = min([size, *(self._equal(term, mode) ** (1 / (order - 1)) for term in terms)])
+            parts.append(largest)
+            if order >= 3 and np.isfinite(size):
                 break
+        return parts, size
+
+    def _terms_along(self, mode: _Mode) -> Iterator[tuple[Array, tuple[Array, ...]]]:
+        """Yield the terms of the branch that leaves along a null vector v, x + a v + a^2 ..., by order, the largest by name.
+
+        Behind the first, with the terms here and at the singular point.
+        """
+        v, second = mode.vector, np.zeros_like(mode.vector)
+        yield self.system.largest(v), ()
+        for order in range(2, _HIGHEST + 1):
             here = self._solved([v] * order) / math.factorial(order)
             there = np.zeros_like(v)
             if order < _HIGHEST:
@@ -360,9 +370,7 @@ class _FirstPoint:
                 second = here + there
             if order == 3:
                 here = here - self._solved([v, second])
-            size = min(size, *(self._equal(term, mode) ** (1 / (order - 1)) for term in (here, there)))
-            parts.append(np.maximum(self.system.largest(here), self.system.largest(there)))
-        return parts, size
+            yield np.maximum(self.system.largest(here), self.system.largest(there)), (here, there)
 
     def _equal(self, term: Array, mode: _Mode) -> float:
         """Return how much longer a null vector is than a term along it: what the power method leaves of the term.
@@ -409,7 +417,7 @@ class _FirstPoint:
 
     def _rounded(self, v: Array) -> Array:
         """Return a vector changed by one unit in the last place, up or down."""
-        found: Array = v * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), v.size))
+        found: Array = v * (1 + np.copysign(np.finfo(float).eps, self._random.random(v.size) - 0.5))
         return found
 
     def _kept(self, v: Array, kept: Pattern) -> Array:
