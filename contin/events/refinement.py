@@ -28,12 +28,25 @@ from contin.linalg.factors import Factors
 _FAR = 0.05
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
-#: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
-_FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
+#: The secant method begins with a step of this length. A hundred times larger, period doublings that saturate are found with a
+#: step more; a hundred times smaller, slopes are lost in round-off where a parameter nearly stands still.
+_FIRST = 1e-4
+#: It ends where the product of the distances to both places of the secant is below this: times half the curvature of the
+#: function, as a part of its slope, that is the error.
+_LAST = 1e-15
+#: Most secants: 2 or 3 are needed.
+_SECANTS = 12
+#: A value that is not below this part of the nearest to zero came no nearer. Ten times smaller, secants that still come nearer
+#: count as round-off; ten times larger, round-off that is smaller by chance does not.
+_NEARER = 0.1
+#: So many of these in a row are round-off: one may be due to the curvature between the first two places.
+_BLURRED = 2
 #: Where it fails, the place is known as far as the function grows on both sides, with different signs: distances at which it
 #: is looked at grow by the first factor, its values at least by the second. Round-off does not grow, and a square root does by
 #: 3.2. The ± is too large by the square of the first at most.
 _WIDER, _GROWS = 10.0, 3.0
+#: The least of these distances.
+_NARROWEST = 1e-9
 #: Distance over which slopes are taken, of an unknown or along the tangent: the cube root of round-off. In a canard explosion
 #: multipliers change by a tenth of their value where it is a thousand times longer.
 ASIDE = 1e-5
@@ -200,15 +213,18 @@ _NEAREST = _Nearest()
 
 
 def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
-    """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected.
+    """Return the zero of a test function near x, by secants along the tangent; without one, x corrected.
 
-    With how far off it may lie: where round-off of the function ends the secant method, the sign of the function decides.
+    Where the function is the value of a free parameter, that is held. Returned last is how far off the zero may lie.
 
     Raises
     ------
     ConvergenceError
         Newton's method fails, or there is no zero.
     """
+    distance, holds = 0.0, test is not None and test.holds_one_of(system.free)
+    if holds:
+        tangent, distance = _towards(system, x, tangent, test)
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
     factors: Factors | None = None
 
@@ -224,25 +240,56 @@ def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | N
             trial = located(there, moved[1](trial.x), s, newton)
         return trial
 
-    trial = here = at(0.0)
-    if test is None:
-        return trial, 0.0
+    here = at(distance)
+    if test is None or holds:
+        return here, 0.0
     factors = here.factors if here.system is system else None
-    s, last, value = _FIRST, 0.0, test.function(trial)
+    return _by_secants(at, here, test)
+
+
+def _towards(system: Discretization, x: Array, tangent: Array, test: Any) -> tuple[Array, float]:
+    """Return the direction in which a free parameter alone changes, along the tangent, and how far its value lies from x."""
+    place = system.parameter_index(test.column)
+    length = float(np.copysign(np.sqrt(system.weights[place]), tangent[place]))
+    gap = test.value / system.free_scales[place - system.state_size] - x[place]
+    along = np.zeros(system.size)
+    along[place] = 1 / length
+    return along, float(gap * length)
+
+
+def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple[Trial, float]:
+    """Return the zero of a test function near ``here``, which is ``at(0)``, and how far off it may lie.
+
+    Each secant goes through the place nearest to zero and the one looked at last. Where some in a row come no nearer, values
+    are round-off, and the slope of the first secant says how far that reaches; where it does not, it is looked for.
+
+    Raises
+    ------
+    ConvergenceError
+        Newton's method fails, or there is no zero.
+    """
+    value = test.function(here)
+    if value == 0:
+        return here, 0.0
+    beside = at(_FIRST)
+    best, other = (0.0, value, here), (_FIRST, test.function(beside), beside)
+    slope, blurred = abs(other[1] - value) / _FIRST, [0.0]
     for _ in range(_SECANTS):
-        if value == 0:
-            return trial, 0.0
-        trial, before = at(s), value
-        if abs(s - last) < _LAST:
-            return trial, 0.0
-        value = test.function(trial)
-        if test.label == Label.FOLD and max(abs(before), abs(value)) < _FLAT:
-            return trial, 0.0  # the parameter stands still all around: its value there is that of the fold
-        if value == before:
-            break  # it does not depend on the place, and is not zero
-        s, last = s - value * (s - last) / (value - before), s
-        if abs(s) > _AWAY:
+        best, other = sorted((best, other), key=lambda place: abs(place[1]))
+        if best[1] == 0 or (test.label == Label.FOLD and abs(other[1]) < _FLAT):
+            return best[2], 0.0  # where a parameter stands still all around, its value there is that of the fold
+        if len(blurred) > _BLURRED or best[1] == other[1]:
+            break  # the function is round-off, or does not depend on the place and is not zero
+        s = best[0] - best[1] * (best[0] - other[0]) / (best[1] - other[1])
+        if not abs(s) <= _AWAY:
             break  # such a zero is another one, or the function is round-off
+        trial = at(s)
+        if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < _LAST:
+            return trial, 0.0
+        other = s, test.function(trial), trial
+        blurred = [*blurred, abs(other[1])] if abs(other[1]) > _NEARER * abs(best[1]) else [0.0]
+    if len(blurred) > _BLURRED and max(blurred) < slope * _FIRST:
+        return best[2], max(blurred) / slope
     return here, _known_to(lambda s: test.function(at(s)))
 
 
@@ -254,7 +301,7 @@ def _known_to(function: Callable[[float], float]) -> float:
     ConvergenceError
         There is none: the function has no zero there, or is round-off.
     """
-    apart, values = _LAST, np.zeros(2)
+    apart, values = _NARROWEST, np.zeros(2)
     while apart <= _AWAY:
         before, values = values, np.array([function(-apart), function(apart)])
         if before[0] * before[1] < 0 and np.all(values / before > _GROWS):
