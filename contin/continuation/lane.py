@@ -283,6 +283,7 @@ class MeshLane(Lane):
         if begun is None:
             return 0
         before, now, clear = begun
+        time = 1.0 if self._monodromy is None else self.system.unit_time(path.x[1])
         error = path.numbers[1, MESH_ERROR]
         poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
@@ -294,7 +295,8 @@ class MeshLane(Lane):
                 was, found = clear, MAY_BRANCH
                 clear = self._compared(after.room, 0)
                 if self._monodromy is not None:
-                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
+                    earlier, time = time, self.system.unit_time(path.x[number])
+                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, time / earlier)
                 asks = found == ASK or not (found == AWAY or self._stays_regular(was, clear, before, after))
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
@@ -329,7 +331,7 @@ class MeshLane(Lane):
                 return None
             factors = self._factors[0]
         clear = self._compared(factors.room, 1)
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0.0) == ASK:
             return None
         return factors, 0, clear
 

@@ -138,11 +138,12 @@ def ends_are_calm(factored: Factored, before: Relations, after: Relations, quoti
 
 
 @kernel(reorder=False, last=True)
-def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: int) -> int:
+def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: float) -> int:
     """Return `ASK` where multipliers at a point that was linearized ask for a closer look at the step that ends there.
 
-    `AWAY` where they do not, and none comes near 1. The end of the step before is its beginning; where one ``begins``, nothing
-    is compared. Round-off on the circle asks, too.
+    `AWAY` where they do not, and none comes near 1. The end of the step before is its beginning, with a round that takes
+    ``longer`` at its end by this factor; where that is 0, the step begins here and nothing is compared. Round-off on the circle
+    asks, too.
     """
     n, size = room.real.size, spectra.real.shape[1]
     for a in range(size):
@@ -164,8 +165,8 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: 
             return ASK
         spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
         at += 1
-    if begins:
+    if longer == 0.0:
         return AWAY
-    if may_cross_between(spectra):
+    if may_cross_between(spectra, longer):
         return ASK
-    return AWAY if keep_off_one(spectra) else MAY_BRANCH
+    return AWAY if keep_off_one(spectra, longer) else MAY_BRANCH

@@ -199,7 +199,8 @@ class Continuation:
     def here(self) -> Trial:
         """Return the state's point, as the step before left it, so that both decide from the same values."""
         if self._end is None:
-            self._end = Trial(self.state.system, self.state.x, Linearization(self.state.tangent, self.state.sign))
+            state = self.state
+            self._end = Trial(state.system, state.x, Linearization(state.tangent, state.sign))
         return self._end
 
     def go_on(self, moved: Moved | None) -> bool:

@@ -111,8 +111,8 @@ class Steps:
         way = self.sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         sensed = free_values(trial) if way else state.sensed
-        end, previous = trial.settled, None if state.singular else state.tangent
-        if previous is not None and end.system is not state.system:
+        end, previous = trial.settled, state.tangent
+        if end.system is not state.system:
             previous = state.system.carrier(end.system)(previous)
         return State(
             end.system, end.x, end.tangent, previous, step, following, end.sign, state.arclength + judgement.length,

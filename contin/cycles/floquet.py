@@ -242,9 +242,11 @@ def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
 
 def _comes_near(arc: Arc, what: int) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
+    system: Any = arc.trial.system
+    longer = system.unit_time(arc.trial.x) / system.unit_time(arc.before.x) if system.intervals else 1.0
     ends = np.array([_without_trivial(arc.before), _without_trivial(arc.trial)])
     real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
-    return bool(comes_near(real, imaginary, what, int(not arc.trial.system.intervals)))
+    return bool(comes_near(real, imaginary, what, int(not system.intervals), longer))
 
 
 @functools.lru_cache(maxsize=4)

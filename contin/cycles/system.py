@@ -65,8 +65,9 @@ class CycleCollocation(PeriodicCollocation, CycleEquations):
     """An autonomous `CycleProblem` on a mesh."""
 
     def events(self) -> list[Event]:
-        """Return also that of homoclinic orbits."""
-        return [*super().events(), homoclinic()]
+        """Return also that of homoclinic orbits; in the plane that alone: beside 1 there is one positive multiplier."""
+        is_planar = self.states_count == 2 and self.order == 1
+        return [homoclinic()] if is_planar else [*super().events(), homoclinic()]
 
     @property
     def size_of_solutions(self) -> Event:

@@ -333,10 +333,10 @@ class Inspection:
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
-        arc, found = self.arc, self._returned
-        if arc.state.accepted < FEWEST or found is None:
+        if not self.may_close() or self._returned is None:
             return None
-        system, trial, (at, x, tangent, first) = arc.state.system, arc.trial, found
+        arc, (at, x, tangent, first) = self.arc, self._returned
+        system, trial = arc.state.system, arc.trial
         if not arc.passes_by(first, at):
             return None
         there = Trial(system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)

@@ -31,24 +31,27 @@ ONE, MINUS_ONE, CIRCLE = range(3)
 
 
 @kernel(last=True)
-def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int) -> int:
+def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int, longer: float) -> int:
     """Return whether a multiplier may have passed 1 or -1, or as one of a pair the circle, and back.
 
     The first and the last row of ``real`` and ``imaginary`` hold the logarithms at both ends, those that are not known as NaN.
     A real multiplier becomes one of a pair only where it meets another one of its sign. It leaves its sign only in that way,
     unless it may be zero, as those of a ``map_`` may.
+
+    A logarithm is a rate times the time of a round, which becomes ``longer`` by this factor: towards a homoclinic orbit all
+    logarithms grow with it, and nothing passes. So rates are compared, over the time at either end.
     """
     last, n = real.shape
     last -= 1
     for side in range(2):
-        here, there = (0, last) if side == 0 else (last, 0)
+        here, there, scale = (0, last, 1 / longer) if side == 0 else (last, 0, longer)
         for i in range(n):
             x, y = real[here, i], imaginary[here, i]
             move, partner = math.inf, math.inf
             for j in range(n):
                 turn = y - imaginary[there, j]
                 turn -= 2 * math.pi * math.floor(turn / (2 * math.pi) + 0.5)
-                move = min(move, math.hypot(x - real[there, j], turn))
+                move = min(move, math.hypot(x - scale * real[there, j], turn))
                 if j != i and abs(imaginary[here, j]) == abs(y):
                     partner = min(partner, abs(real[here, j]))
             distance = math.hypot(x, y)

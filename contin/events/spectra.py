@@ -122,16 +122,18 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 
 
 @helper
-def may_cross_between(spectra: Spectra) -> bool:
+def may_cross_between(spectra: Spectra, longer: float) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step alone."""
+    if _crosses(spectra):
+        return True
     real, imaginary = spectra.real, spectra.imaginary
-    return _crosses(spectra) or bool(comes_near(real, imaginary, MINUS_ONE, 0) or comes_near(real, imaginary, CIRCLE, 0))
+    return bool(comes_near(real, imaginary, MINUS_ONE, 0, longer) or comes_near(real, imaginary, CIRCLE, 0, longer))
 
 
 @helper
-def keep_off_one(spectra: Spectra) -> bool:
+def keep_off_one(spectra: Spectra, longer: float) -> bool:
     """Return whether no multiplier comes near 1, by both ends of a step alone."""
-    return not comes_near(spectra.real, spectra.imaginary, ONE, 0)
+    return not comes_near(spectra.real, spectra.imaginary, ONE, 0, longer)
 
 
 @helper
@@ -140,7 +142,8 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     if _crosses(spectra):
         return True
     real, imaginary, map_ = spectra.real, spectra.imaginary, equations.is_map
-    doubles, twists = comes_near(real, imaginary, MINUS_ONE, map_) > 0, comes_near(real, imaginary, CIRCLE, map_) > 0
+    doubles = comes_near(real, imaginary, MINUS_ONE, map_, 1.0) > 0
+    twists = comes_near(real, imaginary, CIRCLE, map_, 1.0) > 0
     if not (doubles or twists):
         return False
     for number in range(1, LAST):

@@ -181,11 +181,13 @@ class _Object:
         return len(self._value)
 
 
+@functools.lru_cache(maxsize=1024)
 def _catches(code: types.CodeType) -> bool:
     """Return whether a function handles exceptions: not those of generators, and from Python 3.12 on of lists, that pass on."""
     return any(instruction.opname == "PUSH_EXC_INFO" for instruction in dis.get_instructions(code))
 
 
+@functools.lru_cache(maxsize=1024)
 def _globals_in(code: types.CodeType) -> set[str]:
     """Return the names of global values that a code object, and those inside it, read; attributes may have the same names."""
     inner = [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]

@@ -181,7 +181,7 @@ def test_period_doublings_of_rotations():
 
 
 def test_forced_cycles_of_several_rounds_are_brought_in_phase():
-    twice = contin.trace(locked()[1].labelled("PD")[0], branch=1, max_points=4, errors=False).points[-1]
+    twice = contin.trace(locked()[1].labelled("PD")[0], branch=1, max_points=3, errors=False).points[-1]
     system, x = twice.system, twice.x
     later = system.moved(x, 0.5)
     later[: system.state_size : 2] += 3 * TWO_PI

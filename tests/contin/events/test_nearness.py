@@ -9,9 +9,9 @@ import contin
 from contin.events.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 
 
-def near(first, last, what, map_=0):
+def near(first, last, what, map_=0, longer=1.0):
     ends = np.array([first, last], dtype=complex)
-    return bool(comes_near(np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag), what, map_))
+    return bool(comes_near(np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag), what, map_, longer))
 
 
 def test_a_real_multiplier_by_itself_keeps_its_sign():
@@ -30,6 +30,13 @@ def test_multipliers_far_from_everything():
     for what in (ONE, MINUS_ONE, CIRCLE):
         assert not near([5 + 0.1j, 5 - 0.1j, -9], [5.1 + 0.1j, 5.1 - 0.1j, -9.5], what)
     assert near([0.5], [0.6], ONE) and near([0.1 + 2j, 0.1 - 2j], [0.2 + 2j, 0.2 - 2j], CIRCLE)
+
+
+def test_multipliers_of_a_longer_round():
+    """Their logarithms grow with the time that it takes, and not towards anything."""
+    for what in (ONE, MINUS_ONE, CIRCLE):
+        assert near([5, -20], [15, -60], what) and not near([5, -20], [15, -60], what, longer=3.0)
+        assert not near([15, -60], [5, -20], what, longer=1 / 3)
 
 
 def test_multipliers_of_a_cycle_that_rests():
