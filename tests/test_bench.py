@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, cycles, defaults, fold, many, problems, report, startup  # noqa: E402
+from benchmarks import cores, cost, cycles, defaults, fold, many, problems, report, startup  # noqa: E402
 from benchmarks.statements import LARGE, NEWCOMERS, VARIATIONAL, Statement  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
@@ -169,3 +169,8 @@ def test_the_table_of_new_problems():
     assert "| exp | 48 ns | 96 ns | 2.0 |" in text and "now: 1, before: 2. Times are processor times." in text
     alone = problems.table({"first": first, "ns": results["ns"], "versions": {"now": "1"}})
     assert "before" not in alone and "| exp | 48 ns |" in alone
+
+
+def test_stages_of_an_iteration_are_timed():
+    system, x = cores.circle(4, 3)
+    assert set(cores.stages(system, x)) == {"assembly", "factorization", "solve", "transposed", "bits"}

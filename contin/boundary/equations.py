@@ -100,15 +100,19 @@ class BoundaryEquations(OnMesh):
 
     def _linearized(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Factors]:
         """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
-        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self.problem.batch("boundary").columns(self._free))
         if self._components:
-            field, factors = self._factored_apart(x, ends[0], Bordering(columns, rows))
-            return self._residual(x, field, boundary), factors
+            return self._factored_apart(x, Bordering(columns, rows))
+        residual, blocks = self._assembled(x, rows, columns)
+        return residual, Factorization(self._layout, blocks)
+
+    def _assembled(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Blocks]:
+        """Return the residual at x, and the blocks of that matrix."""
+        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self._columns[1])
         field, jacobian = self._field.jacobian(*self._inside(x), self._columns[0])
         blocks = self._empty_blocks(len(rows), len(columns))
         given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
         run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
-        return self._residual(x, field, boundary), Factorization(self._layout, blocks)
+        return self._residual(x, field, boundary), blocks
 
     def _empty_blocks(self, rows: int, columns: int) -> Blocks:
         """Return blocks for so many rows and columns around F_x."""
@@ -132,12 +136,10 @@ class BoundaryEquations(OnMesh):
         """The states in parts that meet at the ends only, as far as they are eliminated one by one."""
         return [component.states for component in self._components] or [np.arange(self._n)]
 
-    def _factored_apart(self, x: Array, at_ends: Array, around: Bordering) -> tuple[Array, Factors]:
-        """Return the values of right-hand side and integrands, and the same matrix factored component by component.
-
-        ``at_ends`` (n_bc, 2 n + k) are the derivatives of the boundary conditions.
-        """
+    def _factored_apart(self, x: Array, around: Bordering) -> tuple[Array, Factors]:
+        """Return the residual at x, and the same matrix factored component by component."""
         n, (columns, rows) = self._n, around
+        boundary, (at_ends,) = self._boundary.jacobian(*self._at_ends(x), self.problem.batch("boundary").columns(self._free))
         inside, of_field = self._inner, self.problem.batch("field").columns(self._free)
         field, entries = self._field.entries(*self._inside(x), of_field)
         points = columns[:, :inside].reshape(len(columns), self.gauss_times.size, n)
@@ -149,7 +151,8 @@ class BoundaryEquations(OnMesh):
         corner = np.concatenate([at_ends[:, 2 * n :], integrals[:, self.state_size :]])
         corner = np.vstack([np.hstack([corner, columns[:, inside:].T]), rows[:, self.state_size :]])
         states = np.concatenate([integrals[:, : self.state_size], rows[:, : self.state_size]])
-        return field, ComponentFactors(parts, Around(at_ends[:, :n], at_ends[:, n : 2 * n], states, corner))
+        factors = ComponentFactors(parts, Around(at_ends[:, :n], at_ends[:, n : 2 * n], states, corner))
+        return self._residual(x, field, boundary), factors
 
     def _part(self, component: Component, of_field: Columns, entries: Array, columns: Array) -> Part:
         """Return the rows of a component from the ``entries`` of the Jacobian, and ``columns`` (c, points, n) besides."""

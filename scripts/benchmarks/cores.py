@@ -32,9 +32,9 @@ def run(quick: bool, exact_fold: float) -> dict:
 
 def _one(degree: int, repeats: int, exact_fold: float) -> dict:
     """Return the results for a degree."""
-    system, x = _circle(degree)
+    system, x = circle(degree)
     half_loop(40, degree, stop="LP")  # loads compiled code
-    steps = in_turn({1: lambda: _threads(1, _stages, system, x), 2: lambda: _threads(2, _stages, system, x)}, 5 * repeats)
+    steps = in_turn({1: lambda: _threads(1, stages, system, x), 2: lambda: _threads(2, stages, system, x)}, 5 * repeats)
     branches = in_turn({1: lambda: _threads(1, _branch, degree), 2: lambda: _threads(2, _branch, degree)}, repeats)
     rows = [*steps[1], *steps[2]], [*branches[1], *branches[2]]
     medians = {
@@ -49,9 +49,9 @@ def _one(degree: int, repeats: int, exact_fold: float) -> dict:
     }  # fmt: skip
 
 
-def _circle(degree: int) -> tuple[contin.lowlevel.Collocation, np.ndarray]:
+def circle(degree: int, intervals: int = INTERVALS) -> tuple[contin.lowlevel.Collocation, np.ndarray]:
     """Return the half loop on a uniform mesh, and the circle as its unknowns."""
-    system = contin.lowlevel.Collocation(half_loop_in_full(), np.linspace(0, 1, INTERVALS + 1), degree, ["kappa_n"], {})
+    system = contin.lowlevel.Collocation(half_loop_in_full(), np.linspace(0, 1, intervals + 1), degree, ["kappa_n"], {})
     states = np.array([circle_in_full(t) for t in system.nodes])
     return system, system.pack(states, {"kappa_n": 2.3, "nu": 0.3})
 
@@ -66,11 +66,11 @@ def _threads(count: int, function, *arguments) -> dict:
         os.environ.pop("CONTIN_THREADS") if before is None else os.environ.update(CONTIN_THREADS=before)
 
 
-def _stages(system: contin.lowlevel.Collocation, x: np.ndarray) -> dict:
+def stages(system: contin.lowlevel.Collocation, x: np.ndarray) -> dict:
     """Return the times of all stages of one Newton iteration, and a hash of all that they give."""
     row, right = np.ones((1, system.size)), np.ones(system.size)
     times = [time.perf_counter()]
-    residual, blocks = system._blocks(x, row, np.empty((0, system.equations)))
+    residual, blocks = system._assembled(x, row, np.empty((0, system.equations)))
     times.append(time.perf_counter())
     factors = Factorization(system._layout, blocks)
     times.append(time.perf_counter())
