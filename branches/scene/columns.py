@@ -45,6 +45,7 @@ class Row:
 
     def __init__(self, point: Point, number: int, stage: Source, others: Sequence[str]):
         self.point, self.number, self.stage, self._others = point, number, stage, others
+        self.index = None if stage.watch is None else stage.watch.index(point)  # which the watch knows of the last points
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
@@ -160,7 +161,7 @@ def _change(name: str, words: str, value: Callable[[Row], Any], kind: str = "i4"
 _INDEX = (
     Column(
         "index", "number of negative directions of the energy; -1 where one is neutral (undecided)",
-        lambda row: row.stage.watch.index(row.point), kind="i4", role=INDEX,
+        lambda row: row.index, kind="i4", role=INDEX,
     ),
     _change("index_before", "the index just before this point, at LP and SB; otherwise -1", lambda row: row.change.before),
     _change("index_after", "the index just after it", lambda row: row.change.after),
