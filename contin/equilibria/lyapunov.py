@@ -14,6 +14,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Numbers
 from contin.equilibria.equations import AlgebraicEquations
 from contin.events.normal_forms import DenseForm
+from contin.linalg.dense import eigenvalues
 
 
 class EquilibriumForm(DenseForm):
@@ -71,6 +72,11 @@ class CriticalPair(NamedTuple):
 #: Largest distance of a critical eigenvalue from i omega, relative to omega: Hopf points are located to 1e-9. Where it is ten
 #: times larger, a kind of problem with another stability is taken for a field if an eigenvalue lies so near by chance.
 _CRITICAL = 1e-4
+
+
+def has_pair(jacobian: Array, frequency: float) -> bool:
+    """Return whether a matrix has the eigenvalue i ``frequency``, as at a Hopf point."""
+    return bool(np.abs(eigenvalues(jacobian) - 1j * frequency).min() < _CRITICAL * abs(frequency))
 
 
 def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPair:

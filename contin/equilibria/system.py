@@ -14,7 +14,7 @@ from contin.defining.hopf_curve import HopfCurve
 from contin.equilibria.dependence import dependence
 from contin.equilibria.equations import AlgebraicEquations
 from contin.equilibria.folds import HOMOCLINIC, events_on_folds
-from contin.equilibria.lyapunov import critical_pair, form_of
+from contin.equilibria.lyapunov import critical_pair, form_of, has_pair
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
@@ -107,5 +107,5 @@ class Algebraic(AlgebraicEquations):
         if point.test is None or point.test.normal_form is fold:
             return None
         frequency = frequency_of(point)
-        is_of_the_field = frequency is None or critical_pair(self.jacobian(point.trial.x), frequency).is_critical
+        is_of_the_field = frequency is None or has_pair(self.jacobian(point.trial.x), frequency)
         return at_special_point(self, point) if is_of_the_field else None

@@ -8,6 +8,7 @@ one pair lies on the axis, the piece is halved. Real eigenvalues that cross (fol
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.normal_forms import pair
 from contin.events.root import find_zero
+from contin.events.spectra import find_moves, moves_of
 
 #: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
 #: of round-off.
@@ -43,6 +45,7 @@ _BESIDE = 1e-3
 _ON_AXIS = 1e-7
 
 
+@functools.cache
 def hopf() -> Event:
     """Return the test function of Hopf points: the largest real part of a complex eigenvalue. Several pairs are told apart."""
 
@@ -61,20 +64,16 @@ def may_pass(arc: Arc) -> bool:
 
 def critical_real_part(frequency: float) -> Callable[[Trial], float]:
     """Return the function of a trial that vanishes at a Hopf point of this frequency: the real part of the critical pair."""
-    return _nearest(1j * frequency).function
+    return lambda trial: _real_part(trial, 1j * frequency)
 
 
-def _nearest(value: complex) -> Event:
-    """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
-
-    def function(trial: Trial) -> float:
-        system: Any = trial.system  # one with eigenvalues
-        if getattr(system, "finds_nearest", False):
-            return float(system.eigenvalue_near(trial.x, value).real)
-        values = _upper(trial)
-        return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
-
-    return Event(Label.HOPF, "Hopf", function, search=hopf_points, normal_form=pair)
+def _real_part(trial: Trial, value: complex) -> float:
+    """Return the real part of the eigenvalue that is nearest to a value."""
+    system: Any = trial.system  # one with eigenvalues
+    if getattr(system, "finds_nearest", False):
+        return float(system.eigenvalue_near(trial.x, value).real)
+    values = _upper(trial)
+    return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
 
 def _upper(trial: Trial) -> ComplexArray:
@@ -116,40 +115,15 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
 
 
 def _moving(places: list[Place]) -> tuple[list[bool], list[bool]]:
-    """Return between which of some places a pair may move to the imaginary axis, and where it is not clear how often.
-
-    An eigenvalue that moves less than it is from the axis does not change the side. Those on the axis at both places do not
-    count, and one alone is no pair. They are taken to move as fast as beside the two places too: ones that go to the axis and
-    come back look as if they stood. One that is on one side, keeps its direction there and beside, and meets no other one does
-    not come back. Where no others come near the axis than two that pass, one pair passes once.
-    """
+    """Return between which of some places a pair may move to the imaginary axis, and where it is not clear how often."""
     system: Any = places[0][1].system
-    values = system.eigenvalues_at([trial.x for _, trial in places])
+    values, count = system.eigenvalues_at([trial.x for _, trial in places]), len(places)
     if not values[0].size or any(len(each) != len(values[0]) for each in values):
-        return [True] * (len(places) - 1), [True] * (len(places) - 1)
+        return [True] * (count - 1), [True] * (count - 1)
     along = np.sort(np.array(values), axis=1)
-    real, lengths = along.real, np.diff([s for s, _ in places])[:, None]
-    distances = np.where((real[1:] == 0) & (real[:-1] == 0), np.inf, np.minimum(np.abs(real[1:]), np.abs(real[:-1])))
-    far = _largest_beside(np.abs(np.diff(along, axis=0)) / lengths) * lengths
-    near = ~(far < distances)
-    if len(places) > 2 and near.any():
-        gaps = np.abs(along[:, :, None] - along[:, None, :])
-        np.einsum("pii->pi", gaps)[:] = np.inf
-        gaps = gaps.min(axis=2)
-        apart = np.minimum(gaps[1:], gaps[:-1]) > far + far.max(axis=1, keepdims=True)
-        rates = np.diff(real, axis=0)
-        onwards = -_largest_beside(-rates) * _largest_beside(rates) > 0
-        near &= ~(apart & onwards & (real[1:] * real[:-1] > 0))
-    count = np.count_nonzero(near, axis=1)
-    once = (count == 2) & (np.abs(np.diff(np.count_nonzero(real > 0, axis=1))) == 2)
-    return (count > 1).tolist(), ((count > 1) & ~once).tolist()
-
-
-def _largest_beside(rows: Array) -> Array:
-    """Return the largest of each number and of those in the rows before and behind it."""
-    wide = np.concatenate([rows[:1], rows, rows[-1:]])
-    found: Array = np.maximum(np.maximum(wide[:-2], wide[2:]), wide[1:-1])
-    return found
+    moves = moves_of(range(count), along.shape[1])
+    find_moves(along.real.copy(), along.imag.copy(), np.array([s for s, _ in places]), moves)
+    return moves.passes.astype(bool).tolist(), moves.unclear.astype(bool).tolist()
 
 
 def _looked_at_closely(arc: Arc, places: list[Place], moves: list[bool], unclear: list[bool]) -> tuple[list[Place], list[bool]]:
@@ -228,7 +202,7 @@ def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoi
     first, last = _changes(left[1], right[1])
     one, other = _half_plane(first), _half_plane(last)
     if np.all(one == other):
-        located = [_located(arc, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        located = [_located(arc, left, right, both) for both in zip(first[one > 0], last[one > 0])]
         found = [point for point in located if point is not None]
         if all(_pairs_at(point) >= _count_at(point, found, arc) for point in found):
             return found
@@ -239,15 +213,15 @@ def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoi
     return _between(arc, left, there, depth + 1) + _between(arc, there, right, depth + 1)
 
 
-def _located(arc: Arc, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
+def _located(arc: Arc, left: Place, right: Place, both: tuple[complex, complex]) -> SpecialPoint | None:
     """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
 
     The second place, not located, where that fails; None where the pair turns out to be real.
     """
-    (a, b), (first, last) = (left[0], right[0]), pair
+    (a, b), (first, last) = (left[0], right[0]), both
 
     def real_part(s: float) -> float:
-        found = _nearest(first + (last - first) * (s - a) / (b - a)).function(arc.at(s))
+        found = _real_part(arc.at(s), first + (last - first) * (s - a) / (b - a))
         if not math.isfinite(found):
             raise ConvergenceError("no eigenvalue is known there")
         return found
@@ -268,7 +242,7 @@ def _located(arc: Arc, left: Place, right: Place, pair: tuple[complex, complex])
     if crossing is None:
         return None
     label, name = crossing
-    test = _nearest(1j * frequency)
+    test = Event(Label.HOPF, "Hopf", critical_real_part(frequency), search=hopf_points, normal_form=pair)
     if is_located and 0.0 in (first.real, last.real) and not passes(arc, at, frequency):
         return None  # the pair lies on the axis before
     details = {"frequency": frequency, "pairs": 1}

@@ -1,12 +1,13 @@
 """What the eigenvalues at both ends of a step say inside kernels: may something pass between them?
 
-The rules are those of `contin.events.hopf` and `contin.cycles.floquet`. Where round-off would decide whether eigenvalues
-lie on the axis, or multipliers on the circle, these ask.
+The rules are those of `contin.events.hopf`, which asks `find_moves`, too, and of `contin.cycles.floquet`. Where round-off
+would decide whether eigenvalues lie on the axis, or multipliers on the circle, these ask.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,8 @@ from contin.arrays import Array
 from contin.core.rounding import NEAR_AXIS, NEAR_CIRCLE
 from contin.core.small import Equations, evaluate_slopes
 from contin.events.nearness import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
-from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.spectrum import fill_eigenvalues
 
 #: Parts of a step at which multipliers are known: both ends, and `LOOKS` between them.
@@ -26,11 +28,31 @@ FIRST, LAST, _COUNT = 0, len(LOOKS) + 1, len(LOOKS) + 2
 _QUARTERS = tuple(place for place, part in enumerate([0.0, *LOOKS, 1.0]) if (4 * part) % 1 == 0)
 
 
+class Moves(NamedTuple):
+    """Between which of some places a pair may move to the imaginary axis.
+
+    ``rows`` (P,) are the places among all. ``far`` (P - 1, n) is how far each eigenvalue moves, ``passes`` (P - 1,) whether a
+    pair may move to the axis, ``unclear`` (P - 1,) whether it is not clear how often.
+    """
+
+    rows: IndexVector
+    far: Matrix
+    passes: IndexVector
+    unclear: IndexVector
+
+
+def moves_of(rows: Sequence[int], n: int) -> Moves:
+    """Return the room for moves of n eigenvalues between rows."""
+    count = len(rows) - 1
+    passes, unclear = np.empty((2, count), dtype=np.int64)
+    return Moves(np.array(rows, dtype=np.int64), np.empty((count, n)), passes, unclear)
+
+
 class Spectra(NamedTuple):
     """Eigenvalues, or logarithms of multipliers, at places of a step: sorted rows of ``real`` and ``imaginary``.
 
     ``values`` are those of the test function of period doublings, ``cubic`` (4, size) the coefficients of the cubic between
-    both ends, ``place`` a point of it, ``parts`` the places as parts of the step.
+    both ends, ``place`` a point of it, ``parts`` the places as parts of the step, ``ends`` and ``quarters`` room for moves.
     """
 
     square: Stack
@@ -42,6 +64,8 @@ class Spectra(NamedTuple):
     cubic: Matrix
     place: Vector
     parts: Vector
+    ends: Moves
+    quarters: Moves
 
 
 def spectra_of(n: int, size: int) -> Spectra:
@@ -49,6 +73,7 @@ def spectra_of(n: int, size: int) -> Spectra:
     return Spectra(
         np.empty((1, n, n)), np.empty((1, n)), np.empty((1, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)),
         np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES,
+        moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
     )  # fmt: skip
 
 
@@ -84,41 +109,76 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
 
 
 @helper
-def moved(spectra: Spectra, one: int, other: int) -> float:
-    """Return the largest distance by which an eigenvalue moves between two places; NaN where one is not known."""
-    largest = 0.0
-    for i in range(spectra.real.shape[1]):
-        apart = math.hypot(
-            spectra.real[other, i] - spectra.real[one, i], spectra.imaginary[other, i] - spectra.imaginary[one, i]
-        )
-        if not apart <= largest:
-            largest = apart
-    return largest
+def _rate(real: Matrix, imaginary: Matrix, at: Vector, rows: IndexVector, k: int, i: int) -> float:
+    """Return how fast an eigenvalue moves behind a place, or behind the nearest one that has another behind it."""
+    k = min(max(k, 0), rows.size - 2)
+    one, other = rows[k], rows[k + 1]
+    apart = math.hypot(real[other, i] - real[one, i], imaginary[other, i] - imaginary[one, i])
+    return apart / (at[other] - at[one])
 
 
 @helper
-def room(spectra: Spectra, one: int, other: int) -> float:
-    """Return the second smallest distance of an eigenvalue to the axis at two places, without those on it at both."""
-    least, second = math.inf, math.inf
-    for i in range(spectra.real.shape[1]):
-        first, last = abs(spectra.real[one, i]), abs(spectra.real[other, i])
-        distance = math.inf if first == 0.0 and last == 0.0 else min(first, last)
-        if distance < least:
-            least, second = distance, least
-        elif distance < second:
-            second = distance
-    return second
+def _keeps_on(real: Matrix, imaginary: Matrix, moves: Moves, k: int, i: int) -> bool:
+    """Return whether an eigenvalue is on one side behind a place, keeps its direction there and beside, and meets no other."""
+    rows, n, furthest = moves.rows, real.shape[1], 0.0
+    one, other, sense = rows[k], rows[k + 1], real[rows[k + 1], i] - real[rows[k], i]
+    if not real[one, i] * real[other, i] > 0:
+        return False
+    for beside in range(max(k - 1, 0), min(k + 2, rows.size - 1)):
+        if not sense * (real[rows[beside + 1], i] - real[rows[beside], i]) > 0:
+            return False
+    for j in range(n):
+        furthest = max(furthest, moves.far[k, j])
+    for j in range(n):
+        if j != i:
+            before = math.hypot(real[one, j] - real[one, i], imaginary[one, j] - imaginary[one, i])
+            behind = math.hypot(real[other, j] - real[other, i], imaginary[other, j] - imaginary[other, i])
+            if not min(before, behind) > moves.far[k, i] + furthest:
+                return False
+    return True
+
+
+@kernel(reorder=False, last=True)
+def find_moves(real: Matrix, imaginary: Matrix, at: Vector, moves: Moves) -> int:
+    """Find between which places a pair may move to the imaginary axis; return between how many.
+
+    ``real`` and ``imaginary`` (all places, n) hold sorted eigenvalues, ``at`` the places. An eigenvalue that moves less than it
+    is from the axis does not change the side. Those on the axis at both places do not count, and one alone is no pair. They are
+    taken to move as fast as beside the two places too: ones that go to the axis and come back look as if they stood. One that
+    keeps on does not come back. Where no others come near the axis than two that pass, one pair passes once.
+    """
+    rows, far, n, found = moves.rows, moves.far, real.shape[1], 0
+    for k in range(rows.size - 1):
+        length = at[rows[k + 1]] - at[rows[k]]
+        for i in range(n):
+            far[k, i] = _rate(real, imaginary, at, rows, k, i)
+            for beside in (k - 1, k + 1):
+                rate = _rate(real, imaginary, at, rows, beside, i)
+                if rate > far[k, i] or rate != rate:  # noqa: PLR0124
+                    far[k, i] = rate
+            far[k, i] *= length
+        near, passed = 0, 0
+        for i in range(n):
+            first, last = real[rows[k], i], real[rows[k + 1], i]
+            passed += int(last > 0) - int(first > 0)
+            distance = math.inf if first == 0.0 and last == 0.0 else min(abs(first), abs(last))
+            if not far[k, i] < distance and not (rows.size > 2 and _keeps_on(real, imaginary, moves, k, i)):
+                near += 1
+        moves.passes[k] = int(near > 1)
+        moves.unclear[k] = int(near > 1 and not (near == 2 and abs(passed) == 2))
+        found += int(near > 1)
+    return found
 
 
 @helper
 def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
     """Return whether a pair may pass the axis, by how far eigenvalues move between both ends and, then, places inside."""
-    if moved(spectra, FIRST, LAST) < room(spectra, FIRST, LAST):
+    if find_moves(spectra.real, spectra.imaginary, spectra.parts, spectra.ends) == 0:
         return False
     for k in range(1, len(_QUARTERS) - 1):
         if _look(equations, spectra, _QUARTERS[k]):
             return True
-    return _moves_far(spectra)
+    return find_moves(spectra.real, spectra.imaginary, spectra.parts, spectra.quarters) > 0
 
 
 @helper
@@ -150,7 +210,7 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
         if _look(equations, spectra, number):
             return True
         _fill_values(spectra, number)
-    return (doubles and _dips(spectra)) or (twists and _moves_far(spectra))
+    return (doubles and _dips(spectra)) or (twists and find_moves(real, imaginary, spectra.parts, spectra.quarters) > 0)
 
 
 @helper
@@ -220,18 +280,4 @@ def _dips(spectra: Spectra) -> bool:
             at, lowest = b - linear / (2 * square), middle - linear * linear / (4 * square)
             if a < at < c and lowest < DEEPER * min(first, middle, last):
                 return True
-    return False
-
-
-@helper
-def _moves_far(spectra: Spectra) -> bool:
-    """Return whether multipliers move, in a quarter of the step or beside it, as far as a pair is from the circle."""
-    for k in range(1, len(_QUARTERS)):
-        far = moved(spectra, _QUARTERS[k - 1], _QUARTERS[k])
-        if k > 1:
-            far = max(far, moved(spectra, _QUARTERS[k - 2], _QUARTERS[k - 1]))
-        if k + 1 < len(_QUARTERS):
-            far = max(far, moved(spectra, _QUARTERS[k], _QUARTERS[k + 1]))
-        if not far < room(spectra, _QUARTERS[k - 1], _QUARTERS[k]):
-            return True
     return False
