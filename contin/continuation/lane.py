@@ -23,9 +23,8 @@ from contin.continuation.plain_on_mesh import (
     ASK,
     AWAY,
     CALM,
-    CHANGES,
     MAY_BRANCH,
-    UNSOUND,
+    TURNS,
     MeshRooms,
     ends_are_calm,
     multipliers_ask,
@@ -61,6 +60,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.crossings import changes_little
 from contin.events.inspection import Start, free_of, returned
+from contin.events.significance import STILL
 from contin.events.spectra import spectra_of
 from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factored, Factorization
@@ -71,8 +71,8 @@ from contin.results.point import Point
 FEWEST, MOST = 8, 128
 #: The length of a step, and its end.
 Handed = tuple[float, Trial]
-#: Where steps on a mesh begin: factors, their place in the lane, and what condensed matrices say there.
-_Begun = tuple[Factorization, int, int]
+#: Where steps on a mesh begin: factors, and their place in the lane.
+_Begun = tuple[Factorization, int]
 #: Where the error of the mesh is above its tolerance already, as finer meshes do not lower it, steps whose errors grow by less
 #: than this factor want none. Ten times larger, errors of the mesh would grow unseen up to where the mesh is adapted next.
 _NO_WORSE = 2.0
@@ -140,7 +140,7 @@ class Lane(ABC):
         self._attempt = Attempt(np.empty(system.size), np.empty(SUMS), np.zeros(JUDGED))
         self._control = Control(
             newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step,
-            primary,
+            primary, STILL if system.intervals else -1.0,
         )  # fmt: skip
         held = [test for test in tests if test.holds_one_of(system.free)]
         ends = np.array([settings.limits.get(name, (-np.inf, np.inf)) for name in system.free], dtype=float)
@@ -256,7 +256,7 @@ class MeshLane(Lane):
         self._monodromy = system.monodromy
         width = 2 * n + len(system.free)
         shapes = (system.intervals - 1, n, width), (width - n, width)
-        self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1])) for _ in range(2)]
+        self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1]), np.empty(shapes[0][0])) for _ in range(2)]
         self._quotient, self._watched = _quotient(width), settings.branch_points
         self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
         self._left: tuple[Array, _Begun] | None = None
@@ -282,7 +282,7 @@ class MeshLane(Lane):
         values, begun = self._work.values, self._begun(path, here)
         if begun is None:
             return 0
-        before, now, clear = begun
+        before, now = begun
         time = 1.0 if self._monodromy is None else self.system.unit_time(path.x[1])
         error = path.numbers[1, MESH_ERROR]
         poor = _NO_WORSE * error if error > self._poor else self._poor
@@ -292,12 +292,11 @@ class MeshLane(Lane):
             step = step_on_mesh(self._rooms[now], path, accepted, number, bend)
             asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
             if not asks:
-                was, found = clear, MAY_BRANCH
-                clear = self._compared(after.room, 0)
+                found, clear = MAY_BRANCH, self._compared(after.room, 0)
                 if self._monodromy is not None:
                     earlier, time = time, self.system.unit_time(path.x[number])
                     found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, time / earlier)
-                asks = found == ASK or not (found == AWAY or self._stays_regular(was, clear, before, after))
+                asks = found == ASK or not (found == AWAY or self._stays_regular(clear, before, after))
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
                 path.numbers[number, MESH_ERROR] = error
@@ -307,7 +306,7 @@ class MeshLane(Lane):
                     self._hand_over(path, number, abs(step), now)
                 return number - 2
             before = after
-        self._left = path.x[-1], (before, now, clear)
+        self._left = path.x[-1], (before, now)
         return len(path.x) - 2
 
     def _begun(self, path: Path, here: Trial) -> _Begun | None:
@@ -330,10 +329,10 @@ class MeshLane(Lane):
             if one_call.correct_on_mesh(self._work, factored, *given) != one_call.CONVERGED:
                 return None
             factors = self._factors[0]
-        clear = self._compared(factors.room, 1)
+        self._compared(factors.room, 1)
         if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0.0) == ASK:
             return None
-        return factors, 0, clear
+        return factors, 0
 
     def _compared(self, factored: Factored, begins: int) -> int:
         """Return what condensed matrices say of a step that ends at a matrix."""
@@ -341,13 +340,11 @@ class MeshLane(Lane):
             return CALM
         before, after = self._relations[::-1]
         self._relations = [before, after]
-        return int(ends_are_calm(factored, before, after, self._quotient, begins))
+        return int(ends_are_calm(self._work.mesh.layout.offsets, factored, before, after, self._quotient, begins))
 
-    def _stays_regular(self, was: int, clear: int, before: Factorization, after: Factorization) -> bool:
+    def _stays_regular(self, clear: int, before: Factorization, after: Factorization) -> bool:
         """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""
-        if was != UNSOUND and clear in (CALM, CHANGES):
-            return clear == CALM
-        return changes_little(before, after, self.system.size)
+        return changes_little(before, after, self.system.size) if clear == TURNS else clear == CALM
 
     def _hand_over(self, path: Path, number: int, step: float, place: int) -> None:
         """Keep a step that was made and asks for a closer look, with its factors, which stand at a place."""

@@ -20,11 +20,11 @@ from contin.core.newton import STAGNANT
 from contin.core.rounding import NEAR_CIRCLE
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import COLLAPSED
-from contin.events.crossings import PIVOT, TURN
+from contin.events.crossings import TURN
 from contin.events.nearness import AS_FAR
 from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends
 
@@ -40,9 +40,8 @@ def _product(row: Array, x: Array) -> float:
 
 #: What multipliers say of a step: look closer; nothing; that a branch point or a fold may lie in it.
 ASK, AWAY, MAY_BRANCH = range(3)
-#: What condensed matrices say: nothing; nothing, because relations turn too much or nothing is compared; that no singular
-#: value comes near zero; that one may.
-UNSOUND, SOUND, CALM, CHANGES = range(4)
+#: What condensed matrices say: nothing, as relations turn too much; that no singular value comes near zero; that one may.
+TURNS, CALM, CHANGES = range(3)
 
 
 class MeshRooms(NamedTuple):
@@ -121,19 +120,17 @@ def rests(field: Matrix, n: int, still: float) -> int:
 
 
 @kernel(reorder=False, last=True)
-def ends_are_calm(factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
-    """Fill in what a matrix says of both ends of the mesh; return what follows for a step.
+def ends_are_calm(
+    offsets: IndexVector, factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int
+) -> int:
+    """Fill in what a matrix says of both ends of the mesh; return what follows for a step, as in `contin.events.crossings`.
 
-    It is `CALM` or `CHANGES` by the condensed matrices from ``before`` on, as in `contin.events.crossings`, if that one was not
-    `UNSOUND`. Where a step ``begins``, nothing is compared.
+    Where a step ``begins``, nothing is compared.
     """
     factors, _, first, last, carried, _ = factored
-    least = relate_ends(factors.chain, carried[0], first, last, after.relations, after.others)
-    if begins or not least > PIVOT:
-        return SOUND if least > PIVOT else UNSOUND
-    turn = divide_ends(before, after, quotient.quotient, quotient.work)
-    if not turn < TURN:
-        return SOUND
+    relate_ends(offsets, factors, carried[0], first, last, after)
+    if begins or not divide_ends(before, after, quotient.quotient, quotient.work) < TURN:
+        return TURNS
     return CALM if calm(quotient) else CHANGES
 
 

@@ -36,7 +36,10 @@ class Frame(NamedTuple):
 
 
 class Control(NamedTuple):
-    """Settings; ``primary`` is the place of the primary parameter, or -1 where folds are not looked for."""
+    """Settings; ``primary`` is the place of the primary parameter, or -1 where folds are not looked for.
+
+    At a rate up to ``still`` it stands still.
+    """
 
     tolerance: float
     most: int
@@ -46,6 +49,7 @@ class Control(NamedTuple):
     shortest: float
     longest: float
     primary: int
+    still: float
 
 
 class Attempt(NamedTuple):
@@ -112,7 +116,8 @@ def judge(frame: Frame, attempt: Attempt, control: Control, path: Path, number: 
     change = max(abs(tangent[at]), abs(new_tangent[at]))
     if bend > 0:
         change = max(change, abs(earlier[at]))
-    if not is_astray(abs(attempt.guess[at] - new[at]), step * change, judged[ERROR], new[at]):
+    astray = is_astray(abs(attempt.guess[at] - new[at]), step * change, judged[ERROR], new[at])
+    if not astray or abs(new_tangent[at]) <= control.still:
         return BELIEVED
     return FAILED if abs(new_tangent[at]) >= CLEAR else ASKS
 
@@ -170,6 +175,8 @@ def _may_turn(attempt: Attempt, control: Control, path: Path, number: int, step:
     """Return whether the primary parameter may turn, as `contin.events.folds.may_turn`."""
     at, x, new = control.primary, path.x[number - 1], path.x[number]
     first, last = path.tangents[number - 1, at], path.tangents[number, at]
+    if abs(last) <= control.still:
+        return False
     if not (min(abs(first), abs(last)) >= CLEAR and first * last > 0 and path.numbers[number - 1, SENSE] * last >= 0):
         return True
     sense = math.copysign(1.0, first)
@@ -192,5 +199,5 @@ def accept(frame: Frame, attempt: Attempt, control: Control, path: Path, number:
     now[ITERATIONS], now[ERROR_LEFT], now[SENSE], now[SENSED] = judged[UPDATES], judged[ERROR], had[SENSE], had[SENSED]
     now[MESH_ERROR] = judged[OF_MESH]
     at = control.primary
-    if at >= 0 and abs(new[at] - x[at]) > STANDS * (1 + abs(new[at])):
+    if at >= 0 and abs(new[at] - x[at]) > STANDS * (1 + abs(new[at])) and abs(tangent[at]) > control.still:
         now[SENSE], now[SENSED] = math.copysign(1.0, tangent[at]), number

@@ -38,9 +38,6 @@ _HALVINGS = 12
 #: The smallest singular value is smaller by far than the next one if their quotient is above this. In layers whose steps were
 #: divided it is 77 and more; three times larger, the first of these are divided again.
 _BY_FAR = 30.0
-#: Without that one, the condensed matrix decides whatever its pivots are: it agreed with the whole one in all of 802 steps in
-#: which it saw no singular value pass zero, of the tests and of a demo with layers.
-_PIVOT = 0.0
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
 
@@ -115,7 +112,7 @@ class BranchPointSearch:
         changes = bool(g[0] * g[1] < 0)
         if not np.isfinite(g).all() or (self._says_sign and changes != self._sign_changes):
             return None
-        values = quotients_along(matrix, _PIVOT)
+        values = quotients_along(matrix)
         if values is None:
             values = quotients(first, last, size + 1)
         if not np.isfinite(values).all():

@@ -6,9 +6,9 @@ eigenvalues negative.
 
 1. Of a small matrix all eigenvalues are computed.
 2. On a mesh the small matrix that condensation leaves (`contin.linalg.ends`) takes its place, as long as the relations between
-   mesh points turn little from one point of the curve to the other, all along the mesh. The condensed matrix cannot tell
-   solutions that have gained a half-wave from those that have not; this is what the turn tells. Where they turn more, places
-   between are looked at, too, on the cubic: over a piece of the step they turn less.
+   mesh points turn little from one point of the curve to the other, all along the mesh, and stay on the same side. The
+   condensed matrix cannot tell solutions that have gained a half-wave from those that have not; this is what turn and sides
+   tell. Where they turn more, places between are looked at, too, on the cubic: over a piece of the step they turn less.
 3. Otherwise the eigenvalues are computed in the directions in which the inverses differ most, by a block Krylov method.
    Directions in which the matrix is nearest to singular are not the same: small singular values that stay as they are would
    hide those that pass.
@@ -34,10 +34,10 @@ from contin.linalg.singular import fill_products, orthonormalize, random_rows
 _SMALL = 64
 #: Size of the largest matrix of which all are computed where the iteration does not decide.
 _MEDIUM = 128
-#: Sum of the squared sines of the angles by which relations may turn, and least pivot as a part of the mean: then the condensed
-#: matrix decides. It disagreed with the whole one in none of 7,300 steps of the tests (from a turn of .55 and a pivot of .35 on
-#: in some), except beside a layer, where it is right.
-TURN, PIVOT = 0.5, 0.2
+#: Sum of the squared sines of the angles by which relations may turn: then the condensed matrix decides. Below 1 no direction
+#: turns by a right angle, so that it can be told on which side it is. With half of it, three times as many steps of the demo
+#: ``kar`` are looked at closely; no test sees a difference.
+TURN = 0.9
 #: How often a step is halved where relations turn more over it: over half of it, they turn a quarter as much. With two, 25
 #: steps of AUTO's demo ``ab`` stay undecided, with three 16.
 _HALVINGS = 3
@@ -91,51 +91,47 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
     return _all(before, after, size) if size <= _MEDIUM else np.full(1, np.nan, dtype=complex)
 
 
-def quotients_along(factors: Callable[[float], Factors], pivot: float = PIVOT) -> ComplexArray | None:
+def quotients_along(factors: Callable[[float], Factors]) -> ComplexArray | None:
     """Return how singular values change from each of some places of a step to the next, where condensed matrices decide.
 
     Parameters
     ----------
     factors : callable
         Returns those of [F_x; row] at a part of the step, from 0 to 1.
-    pivot : float
-        The least pivot of condensed matrices that decide.
 
     Returns
     -------
     ndarray or None
         Eigenvalues of the quotients; NaN where relations turn too much, None where matrices are not condensed.
     """
-    if not _is_condensed(factors(1.0), pivot):
+    if not _is_condensed(factors(1.0)):
         return None
-    quotients = list(_along(factors, 0.0, 1.0, _HALVINGS, pivot))
+    quotients = list(_along(factors, 0.0, 1.0, _HALVINGS))
     return np.concatenate([np.full(1, np.nan, complex) if found is None else _finite_eigenvalues(found) for found in quotients])
 
 
-def _along(
-    factors: Callable[[float], Factors], start: float, end: float, halvings: int, pivot: float
-) -> Iterator[Array | None]:
+def _along(factors: Callable[[float], Factors], start: float, end: float, halvings: int) -> Iterator[Array | None]:
     """Yield quotients of condensed matrices over pieces of a step, halved where these do not decide; None, last, in the end."""
-    quotient = _condensed(factors(start), factors(end), pivot)
+    quotient = _condensed(factors(start), factors(end))
     if quotient is not None or not halvings:
         yield quotient
         return
     middle = (start + end) / 2
-    for quotient in _along(factors, start, middle, halvings - 1, pivot):
+    for quotient in _along(factors, start, middle, halvings - 1):
         yield quotient
         if quotient is None:
             return
-    yield from _along(factors, middle, end, halvings - 1, pivot)
+    yield from _along(factors, middle, end, halvings - 1)
 
 
-def _is_condensed(factors: Any, pivot: float) -> bool:
-    """Return whether a matrix has been condensed with no pivot less than a part of their mean."""
-    return isinstance(factors, Factorization) and factors.ends is not None and factors.ends.least_pivot > pivot
+def _is_condensed(factors: Any) -> bool:
+    """Return whether a matrix has been condensed."""
+    return isinstance(factors, Factorization) and factors.ends is not None
 
 
-def _condensed(before: Any, after: Any, pivot: float = PIVOT) -> Array | None:
+def _condensed(before: Any, after: Any) -> Array | None:
     """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
-    if not (_is_condensed(before, pivot) and _is_condensed(after, pivot)):
+    if not (_is_condensed(before) and _is_condensed(after)):
         return None
     quotient, turn = compared(before.ends, after.ends)
     return quotient if turn < TURN and np.isfinite(quotient).all() else None

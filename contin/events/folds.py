@@ -76,9 +76,12 @@ def ends_low(first: float, last: float, linear: float, square: float) -> bool:
 def may_turn(arc: Arc, fold: Event) -> bool:
     """Return whether the primary parameter may turn inside a step, by its rates at both ends and their parabola.
 
-    It may, too, where its sense cannot be told at an end, or is not that in which it went before.
+    It may, too, where its sense cannot be told at the beginning, or is not that in which it went before. Where it stands still
+    at the end, as far as can be told, no fold is seen.
     """
     ends = senses(arc, fold)
+    if not ends[1]:
+        return False
     if not ends[0] * ends[1] > 0 or arc.state.sense * ends[1] < 0:
         return True
     search = FoldSearch(arc, fold, lambda: None)

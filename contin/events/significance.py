@@ -29,10 +29,12 @@ _ROUND_OFF = 1e-14
 #: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
 #: times larger, another fold could lie between.
 _BESIDE = 1e-4
-#: Draws of the signs of round-off. One more changes the estimate by a few percent.
-_DRAWS = 3
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5
+#: One up to this is not, on a mesh: one that agrees is round-off, too.
+STILL = _ROUND_OFF / (1 + _AGREES)
+#: Draws of the signs of round-off. One more changes the estimate by a few percent.
+_DRAWS = 3
 
 
 def sense(trial: Trial, fold: Event, newton: Newton) -> float:
@@ -51,8 +53,8 @@ def _sense(trial: Trial, fold: Event, newton: Newton) -> float:
         return float(np.sign(rate))
     if not trial.system.intervals:  # without a mesh, there is round-off only
         return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
-    if not (1 + _AGREES) * abs(rate) > _ROUND_OFF:
-        return 0.0  # one that agrees is round-off, too
+    if not abs(rate) > STILL:
+        return 0.0
     finer = on_finer_mesh(trial, newton)
     if finer is None:
         return 0.0

@@ -108,7 +108,9 @@ class Factorization:
     def ends(self) -> Ends | None:
         """What is left between both ends of the mesh; None for a single interval, and for matrices of several segments."""
         factors, _, first, last, carried, _ = self.room
-        return Ends(factors.chain, carried[0], first, last) if self._whole.last == 1 < len(factors.local) else None
+        if self._whole.last > 1 or len(factors.local) == 1:
+            return None
+        return Ends(self._layout.offsets, factors, carried[0], first, last)
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""

@@ -20,25 +20,38 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Indices
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, helper
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.linalg.elimination import Eliminated
 from contin.linalg.singular import orthonormalize_row
 
 
+class Relations(NamedTuple):
+    """What is filled in of `Ends`."""
+
+    relations: Stack
+    others: Matrix
+    sides: Vector
+
+
 @kernel
-def relate_ends(chain: Stack, carried: Matrix, first: Matrix, last: Matrix, relations: Stack, others: Matrix) -> float:
-    """Fill the ``relations`` and ``others`` of `Ends`, and return the least pivot, all described there."""
+def relate_ends(
+    offsets: IndexVector, factors: Eliminated, carried: Matrix, first: Matrix, last: Matrix, found: Relations
+) -> None:
+    """Fill in what `Ends` describes; ``offsets`` are those of the groups of states in a `Layout`."""
+    relations, others, sides = found
     points, n, width = relations.shape
-    least, total = math.inf, 0.0
+    rows = factors.local.shape[1]
+    side = _side_of_interval(factors, 0, offsets)
     for j in range(points):
-        block, rows = chain[j], relations[j]
+        block, span = factors.chain[j], relations[j]
+        side *= _side_of_interval(factors, j + 1, offsets) * _side(block, factors.pivots[j + 1, rows - n :], 0, 0, n)
+        sides[j] = side
         for i in range(n):
-            pivot = 1.0 / abs(block[i, i])  # inverse triangles are kept
-            least, total = min(least, pivot), total + pivot
             for b in range(width):
-                rows[i, b] = block[n + i, n + b]
-            orthonormalize_row(rows, i)
+                span[i, b] = block[n + i, n + b]
+            orthonormalize_row(span, i)
     conditions, span = first.shape[0], relations[points - 1]
     for i in range(conditions):
         for b in range(n):
@@ -53,7 +66,28 @@ def relate_ends(chain: Stack, carried: Matrix, first: Matrix, last: Matrix, rela
             product = _product(carried[n + i], span[k])
             for b in range(width):
                 row[b] -= product * span[k, b]
-    return float(least * points * n / total)
+
+
+@helper
+def _side(block, pivots, top, left, right):
+    """Return the sign of the product of the pivots of some columns, times -1 for each exchange of rows."""
+    sign = 1.0
+    for column in range(left, right):
+        row = top + column - left
+        if (block[row, column] < 0) != (pivots[column] != row):  # inverse triangles are kept
+            sign = -sign
+    return sign
+
+
+@helper
+def _side_of_interval(factors, j, offsets):
+    """Return the same of the interior columns of an interval."""
+    sign, n = 1.0, offsets[offsets.size - 1]
+    degree = factors.local.shape[1] // n
+    for g in range(offsets.size - 1):
+        left, right = (degree - 1) * offsets[g], (degree - 1) * offsets[g + 1]
+        sign *= _side(factors.local[j], factors.pivots[j], degree * offsets[g], left, right)
+    return sign
 
 
 @helper
@@ -65,17 +99,22 @@ def _product(one, other):
     return product
 
 
-class Relations(NamedTuple):
-    """The arrays of `Ends`."""
-
-    relations: Stack
-    others: Matrix
-
-
 @kernel
 def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
     """Fill the ``quotient`` (2 n + k, 2 n + k), and return the largest turn, both described in `compared`."""
     points, n, size = before.relations.shape
+    largest = 0.0
+    for j in range(points):
+        total = float(n)
+        for i in range(n):
+            for k in range(n):
+                product = _product(before.relations[j, i], after.relations[j, k])
+                total -= product * product
+                work[i, k] = product
+        if _sign(work, n) * before.sides[j] * after.sides[j] < 0:
+            total = math.inf
+        if not total <= largest:
+            largest = total
     one, other = before.relations[points - 1], after.relations[points - 1]
     for i in range(n):
         for b in range(size):
@@ -88,16 +127,29 @@ def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Mat
         for b in range(size):
             quotient[i, b], work[i, b] = before.others[i - n, b], after.others[i - n, b]
     _solve(work, quotient)
-    largest = 0.0
-    for j in range(points):
-        total = float(n)
-        for i in range(n):
-            for k in range(n):
-                product = _product(before.relations[j, i], after.relations[j, k])
-                total -= product * product
-        if not total <= largest:
-            largest = total
     return largest
+
+
+@helper
+def _sign(matrix, size):
+    """Return the sign of the determinant of the first rows and columns of a matrix, which are overwritten."""
+    sign = 1.0
+    for column in range(size):
+        place = column
+        for i in range(column + 1, size):
+            if abs(matrix[i, column]) > abs(matrix[place, column]):
+                place = i
+        if place != column:
+            sign = -sign
+            for b in range(size):
+                matrix[column, b], matrix[place, b] = matrix[place, b], matrix[column, b]
+        if matrix[column, column] < 0:
+            sign = -sign
+        for i in range(column + 1, size):
+            factor = matrix[i, column] / matrix[column, column] if matrix[column, column] != 0.0 else 0.0
+            for b in range(column + 1, size):
+                matrix[i, b] -= factor * matrix[column, b]
+    return sign
 
 
 @helper
@@ -172,8 +224,9 @@ class Ends:
 
     Parameters
     ----------
-    chain : ndarray
-        That of `contin.linalg.elimination.Eliminated`.
+    offsets : ndarray of int
+        Where the groups of states begin, as in `contin.linalg.layout.Layout`.
+    factors : Eliminated
     carried : ndarray, shape (n + r, 2 n + k)
         The rows that relate both ends, and the border.
     first, last : ndarray, shape (n_bc, n) and (n_bc, n + k)
@@ -183,17 +236,18 @@ class Ends:
     ----------
     relations : ndarray, shape (N - 1, n, 2 n + k)
         Orthonormal rows that relate the first mesh point to each of the others, from the second on.
-    least_pivot : float
-        The least pivot of the mesh points, as a part of their mean.
     others : ndarray, shape (n_bc + r, 2 n + k)
         Boundary conditions and border.
+    sides : ndarray, shape (N - 1,)
+        On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
     """
 
-    def __init__(self, chain: Array, carried: Array, first: Array, last: Array) -> None:
-        (conditions, n), (height, width) = first.shape, carried.shape
-        self.relations = np.empty((len(chain), n, width))
-        self.others = np.empty((conditions + height - n, width))
-        self.least_pivot = relate_ends(chain, carried, first, last, self.relations, self.others)
+    def __init__(self, offsets: Indices, factors: Eliminated, carried: Array, first: Array, last: Array) -> None:
+        (conditions, n), (height, width), points = first.shape, carried.shape, len(factors.chain)
+        found = Relations(np.empty((points, n, width)), np.empty((conditions + height - n, width)), np.empty(points))
+        relate_ends(offsets, factors, carried, first, last, found)
+        self.found = found
+        self.relations, self.others, self.sides = found
 
 
 def compared(before: Ends, after: Ends) -> tuple[Array, float]:
@@ -201,8 +255,9 @@ def compared(before: Ends, after: Ends) -> tuple[Array, float]:
 
     The rows that relate the ends at the second point are the projections of those at the first one to their span there, so
     that both matrices have the same rows. The turn is the largest sum, over the mesh points, of the squared sines of the angles
-    between the two spans of relations.
+    between the two spans of relations; infinity where a span has turned to its other side, as where a mode that no end feels
+    becomes singular inside.
     """
     quotient, work = np.empty((2, *([before.relations.shape[2]] * 2)))
-    turn = divide_ends(Relations(before.relations, before.others), Relations(after.relations, after.others), quotient, work)
+    turn = divide_ends(before.found, after.found, quotient, work)
     return quotient, turn
