@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Self, TypeVar
 
@@ -128,13 +129,32 @@ class ConnectionEquations(Conditioned):
         jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
         return jacobian * sizes / sizes[:, None]
 
+    def _linear_at_ends(self, p: Array) -> list[tuple[Array, _Schur]]:
+        """Return the Jacobians at both equilibria, and the Schur forms of their transposes, once for values of all parameters.
+
+        Raises
+        ------
+        ConvergenceError
+            A Jacobian is not finite.
+        """
+
+        def made(place: Array) -> tuple[Array, _Schur]:
+            jacobian = self._jacobian_at(place[0], p)
+            if not np.isfinite(jacobian).all():
+                raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
+            return jacobian, _schur(jacobian.T)
+
+        def both() -> list[tuple[Array, _Schur]]:
+            first, last = self._places(p[None])
+            known = made(first)
+            return [known, known if last is first else made(last)]
+
+        return self._once("linear", p, both)
+
     def _left_vectors(self, p: Array) -> list[Array]:
         """Return bases of the spaces of L and L' for values of all parameters, not normalized."""
-        places = self._places(p[None])
-        return [
-            _left_subspace(self._jacobian_at(place[0], p), count, stable=end == 0)
-            for end, (place, count) in enumerate(zip(places, self.problem.conditions))
-        ]
+        ends = enumerate(zip(self._linear_at_ends(p), self.problem.conditions))
+        return [_left_subspace(schur, count, stable=end == 0) for end, ((_, schur), count) in ends]
 
     def _subspaces_along(self, p: Array, directions: Sequence[Array]) -> list[dict[Numbers, Array]]:
         """Return L, and then L', with their derivatives along directions of all parameters, for all subsets of the directions.
@@ -179,8 +199,8 @@ class ConnectionEquations(Conditioned):
         return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        A, Q = self._jacobian_at(self._places(p[None])[end][0], p), self._bases[end]
-        L, N = _normalized(_left_subspace(A, self.problem.conditions[end], stable=end == 0), Q), self._complements[end]
+        (A, schur), Q = self._linear_at_ends(p)[end], self._bases[end]
+        L, N = _normalized(_left_subspace(schur, self.problem.conditions[end], stable=end == 0), Q), self._complements[end]
         made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
         return Q, L, lambda right: made()(-right @ N) @ N.T
 
@@ -201,7 +221,7 @@ class ConnectionEquations(Conditioned):
             chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, : self._n] * sizes / sizes[:, None]
             for chosen in subsets(len(directions))[1:]
         }
-        return {(): self._jacobian_at(place[0], p), **found}
+        return {(): self._linear_at_ends(p)[end][0], **found}
 
     def _fold_along(self, p: Array, directions: Sequence[Array]) -> dict[Numbers, Array]:
         """Return g, shape (1,), with its derivatives along all subsets of the directions; of a saddle, shape (0,)."""
@@ -321,30 +341,31 @@ class ConnectionEquations(Conditioned):
 
     def saddle_jacobian(self, x: Array) -> Array:
         """Return the derivatives of the field by the states at the first equilibrium, scaled, shape (n, n)."""
-        p = self.all_parameters(x)
-        return self._jacobian_at(self._places(p[None])[0][0], p)
+        return self._linear_at_ends(self.all_parameters(x))[0][0]
 
     def saddle(self, x: Array) -> SaddleSpectrum:
         """Return eigenvalues and eigenvectors at the first equilibrium."""
         return self._once("saddle", self.all_parameters(x), lambda: _spectrum(self.saddle_jacobian(x)))
 
-    def left_null_vector(self, x: Array) -> Array:
-        """Return w with w F_z = 0, of unit length, z all unknowns but the user's parameters, with the sign of the reference."""
-        return self._once("left", x, lambda: self._left_null_vector(x))
+    def left_null_vector(self, x: Array, factors: Factors | None = None) -> Array:
+        """Return w with w F_z = 0, of unit length, z all unknowns but the user's parameters, with the sign of the reference.
 
-    def _left_null_vector(self, x: Array) -> Array:
-        if x is self.reference:
-            border = np.random.default_rng(11).standard_normal(self.equations)
-        else:
-            border = self.left_null_vector(self.reference)
+        ``factors`` are those of [F_x; row] at x, with any row, where they are at hand.
+        """
+        return self._once("left", x, lambda: self._left_null_vector(x, factors))
+
+    def _left_null_vector(self, x: Array, factors: Factors | None) -> Array:
+        """Return it from solutions of F_x^T y + m row = e for the user's two parameters, combined so that no row is left."""
+        random = np.random.default_rng(11)
+        if factors is None:
+            _, factors = self.linearize(x, (random.standard_normal(self.size),))
         own = [name for name in self.free if name not in self.problem.multipliers]
-        held = np.zeros((len(own), self.size + 1))
-        held[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
-        _, factors = self.linearize(x, held, border[None])
-        unit = np.zeros(self.size + 1)
-        unit[-1] = 1.0
-        w: Array = factors.solve_transposed(unit)[: self.equations]
-        return w / np.linalg.norm(w)
+        units = np.zeros((2, self.size))
+        units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
+        (*first, one), (*last, other) = factors.solve_transposed(units)
+        w: Array = other * np.array(first) - one * np.array(last)
+        near = random.standard_normal(w.size) if x is self.reference else self.left_null_vector(self.reference)
+        return w * (math.copysign(1.0, w @ near) / np.linalg.norm(w))
 
     def slow_motion(self, x: Array) -> tuple[Array, float]:
         """Return p and a of a saddle-node: its slow motion is c' = a c^2, with c = p.(u - e) and p.q = 1, |q| = 1.
@@ -377,7 +398,7 @@ class ConnectionEquations(Conditioned):
         for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
             if not len(L):
                 continue
-            A, L, N = self._jacobian_at(self._places(p[None])[end][0], p), _normalized(L, self._bases[end]), null_space(L)
+            A, L, N = self._linear_at_ends(p)[end][0], _normalized(L, self._bases[end]), null_space(L)
             K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
             bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
             H = solve_sylvester(-M, np.kron(K, unit) + np.kron(unit, K), bent)
@@ -453,7 +474,22 @@ def _spectrum(jacobian: Array) -> SaddleSpectrum:
     return SaddleSpectrum(values[order].astype(complex), vectors[:, order].astype(complex))
 
 
-def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
+class _Schur(NamedTuple):
+    """A matrix as v t v^T, with orthogonal v and quasi-triangular t, and the real parts of its eigenvalues in their order."""
+
+    t: Array
+    v: Array
+    rates: Array
+
+
+def _schur(matrix: Array) -> _Schur:
+    from scipy.linalg.lapack import dgees  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+    t, _, rates, _, v, _, _ = dgees(lambda *_: 0, matrix, sort_t=0)
+    return _Schur(t, v, rates)
+
+
+def _left_subspace(transposed: _Schur, count: int, stable: bool) -> Array:
     """Return a basis (count, n) of the left eigenvectors with the ``count`` least (stable) or largest real parts.
 
     Raises
@@ -461,32 +497,26 @@ def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
     ConvergenceError
         The equilibrium has not so many.
     """
-    from scipy.linalg import schur  # .1 s; only this needs it
+    from scipy.linalg.lapack import dtrsen
 
-    if not np.isfinite(jacobian).all():
-        raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
-    rates = np.sort(np.linalg.eigvals(jacobian).real)
-    n = len(rates)
+    t, v, rates = transposed
+    order = np.argsort(rates if stable else -rates, kind="stable")
     if count == 0:
-        return np.empty((0, n))
-    sign = 1.0 if stable else -1.0
-    rates = rates if stable else -rates[::-1]
-    bound = sign * (rates[count - 1] + rates[count]) / 2 if count < n else sign * np.inf
-    chosen = (lambda re, im: re < bound) if stable else (lambda re, im: re > bound)
-    _, vectors, found = schur(jacobian.T, sort=chosen)
-    if found != count:
+        return np.empty((0, len(v)))
+    if count < len(v) and rates[order[count - 1]] == rates[order[count]]:
         raise ConvergenceError(f"the equilibrium has not {count} eigenvalues of one kind")
-    return np.ascontiguousarray(vectors[:, :count].T)
+    chosen = np.zeros(len(v), dtype=np.int32)
+    chosen[order[:count]] = 1
+    return np.ascontiguousarray(dtrsen(chosen, t, v, job="N")[1][:, :count].T)
 
 
 def _sylvester(a: Array, b: Array) -> Callable[[Array], Array]:
     """Return what solves a X + X b = right for X, as SciPy's ``solve_sylvester`` does, with the Schur forms made once."""
-    from scipy.linalg import schur
-    from scipy.linalg.lapack import dtrsyl  # type: ignore[import-untyped]
+    from scipy.linalg.lapack import dtrsyl
 
     if not (a.size and b.size):
         return lambda right: np.zeros((len(a), len(b)))
-    (r, u), (s, v) = schur(a), schur(b.T)
+    (r, u, _), (s, v, _) = _schur(a), _schur(b.T)
 
     def solve(right: Array) -> Array:
         found, scale, _ = dtrsyl(r, s, u.T @ right @ v, tranb="C")

@@ -271,7 +271,8 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
             there = system.left_null_vector(system.reference)
             if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > _NOTHING:
                 return float("nan")
-        adjoint, unit = system.adjoint_at_ends(x, system.left_null_vector(x))[side], _leading_vectors(trial, side)[0]
+        adjoint = system.adjoint_at_ends(x, system.left_null_vector(x, trial.factors))[side]
+        unit = _leading_vectors(trial, side)[0]
         return float(unit @ adjoint) if known else _component(unit, adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
