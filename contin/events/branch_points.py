@@ -62,7 +62,8 @@ class BranchPointSearch:
         same = same_sign(before.sign, trial.sign)
         if same and state.system.cannot_branch(self.arc):
             return 0, True
-        if before.factors is None:
+        kept = before.factors is not None  # bordered by a row of the step before
+        if not kept:
             before.refactor(row)
         if same and calm(before.factors, trial.factors, size):
             return 0, True
@@ -73,7 +74,8 @@ class BranchPointSearch:
                 return 0, True
         if watched and self._without_smallest is not None:
             return self._without_smallest
-        before.refactor(row)
+        if kept:
+            before.refactor(row)
         values = quotients(before.factors, trial.factors, size)
         self._shares = np.sort(_shares(values[values.real < 0]))
         count, clear = crossings(values)
