@@ -3,6 +3,7 @@ from .boundary.second_variation import Undetermined
 from .boundary.system import Collocation
 from .collocation.basis import basis, interpolation
 from .continuation.run import Continuation
+from .core.labels import Label
 from .core.newton import correct
 from .core.state import State, Stop
 from .core.trial import Trial
@@ -29,7 +30,7 @@ from .search.trace import follow
 from .shown import shown
 
 __all__ = [
-    "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "MultiplePoint", "PALETTE",
+    "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",
     "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
     "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
     "interpolation", "least", "locate_branch_point", "minimum", "oscillation", "point_of", "read_columns", "root", "shown",

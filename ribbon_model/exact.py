@@ -29,6 +29,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from contin.lowlevel import Label
 from ribbon_model import exact_finite_width
 from ribbon_model.exact_rods import FLOAT, RODS, Numerics
 from ribbon_model.laws import LAWS
@@ -201,19 +202,19 @@ def curve(m, n, parameters=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ri
     def turning(z):
         return _turning(family, z)[1]
 
-    points, before = [family.point(begin, "BP")], turning(begin)
+    points, before = [family.point(begin, Label.BRANCH_POINT)], turning(begin)
     for line, length, ahead in _segments(family, step):
-        stops = [(length, ahead, "MX" if _homoclinic(ahead) else "")]
+        stops = [(length, ahead, Label.FAILED if _homoclinic(ahead) else "")]
         after = turning(ahead)
         if before * after < 0:
             fold = _root(turning, line, 0.0, length)
-            stops.insert(0, (fold, line(fold), "LP"))
+            stops.insert(0, (fold, line(fold), Label.FOLD))
         before, last = after, 0.0
         for s, z, label in stops:
             if z[0] < 0 and room(family.circle(family.finish)) >= 0:
-                return [*points, family.point(family.circle(family.finish), "BP")]
+                return [*points, family.point(family.circle(family.finish), Label.BRANCH_POINT)]
             if room(z) < 0:
-                return [*points, family.point(line(_root(room, line, last, s)), "EP")]
+                return [*points, family.point(line(_root(room, line, last, s)), Label.END)]
             points.append(family.point(z, label))
             last = s
     return points
@@ -245,7 +246,7 @@ def folds(m, n, parameters=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root
     >>> [round(point.kappa_n, 6) for point in folds(1, 2, 0.3)]
     [4.075668]
     """
-    return [point for point in curve(m, n, parameters, kappa_limits, law=law, root=root) if point.label == "LP"]
+    return [point for point in curve(m, n, parameters, kappa_limits, law=law, root=root) if point.label == Label.FOLD]
 
 
 @takes_parameters
@@ -304,9 +305,9 @@ def refine(point, digits):
 
     def conditions(family, z, kappa_n, numerics):
         defect, turning = _turning(family, z, numerics)
-        if point.label == "LP":
+        if point.label == Label.FOLD:
             return np.array([defect, turning])
-        if point.label == "BP":
+        if point.label == Label.BRANCH_POINT:
             return np.array([defect, z[0]])
         return np.array([defect, family.values(z, numerics)[0] - kappa_n])
 

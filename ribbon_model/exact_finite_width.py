@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contin.lowlevel import Label
 from ribbon_model import linear
 from ribbon_model.law import Law
 from ribbon_model.laws import FINITE_WIDTH
@@ -169,7 +170,7 @@ class _Branch:
         kappa_n = linear.thresholds(self.law, index, self.n, self.parameters)[0]
         values = linear.circle(self.law, index, kappa_n, self.parameters)
         place = (kappa_n, float(index), 0.0, float(values["kappa_star"]), float(values["energy"]))
-        return FiniteWidthPoint(self.law, self.parameters, self.m, self.n, *place, "BP")
+        return FiniteWidthPoint(self.law, self.parameters, self.m, self.n, *place, Label.BRANCH_POINT)
 
     def first(self):
         """Return the first point after the circle, with the smallest sqrt(A)."""
@@ -216,14 +217,14 @@ def curve(m, n, parameters, kappa_limits=(-100.0, 100.0), step=0.1, law=FINITE_W
             continue
         turned = turned * np.sign(turned @ tangent)
         if tangent[0] * turned[0] < 0:
-            points.append(branch.point(_fold(branch, v, tangent, ahead), "LP"))
+            points.append(branch.point(_fold(branch, v, tangent, ahead), Label.FOLD))
         if not kappa_limits[0] < ahead[0] < kappa_limits[1]:
             bound = kappa_limits[0] if ahead[0] <= kappa_limits[0] else kappa_limits[1]
             at = v + (ahead - v) * (bound - v[0]) / (ahead[0] - v[0])
-            return [*points, branch.point(branch.correct(at, np.array([1.0, 0.0, 0.0])), "EP")]
+            return [*points, branch.point(branch.correct(at, np.array([1.0, 0.0, 0.0])), Label.END)]
         points.append(branch.point(ahead))
         v, tangent, length = ahead, turned, min(1.5 * length, step)
-    return [*points, branch.point(v, "MX")]
+    return [*points, branch.point(v, Label.FAILED)]
 
 
 def solve(guess: FiniteWidthPoint, *, kappa_n: float | None = None, amplitude: float | None = None) -> FiniteWidthPoint:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin import Settings, trace
-from contin.lowlevel import Collocation, point_of, shown
+from contin.lowlevel import Collocation, Label, point_of, shown
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
 from ribbon_model.law import Law
@@ -68,10 +68,10 @@ def folding(law: Law, m: int, kappa_n: float, parameters: float | Mapping[str, f
     start = HALF_LOOP_BETWEEN_AXES.circle(system, m, kappa_n)
     settings = Settings(primary="M2", limits={"M2": (-_LARGEST, _LARGEST)}, zeros={"M2": [0.0]}, max_points=_MOST, errors=False)
     points = trace(point_of(system, start), settings, progress=False).points
-    ends = [i for i, point in enumerate(points) if point.label == "UZ" and i]
+    ends = [i for i, point in enumerate(points) if point.label == Label.USER_ZERO and i]
     if not ends:
         return None
-    points = [point for point in points[: ends[0] + 1] if point.label in ("", "EP", "LP", "UZ")]
+    points = [point for point in points[: ends[0] + 1] if point.label in ("", Label.END, Label.FOLD, Label.USER_ZERO)]
     frames = np.array([directors(*point.system.states(point.x)[-1, :4]) for point in points])
     angles = np.unwrap(np.arctan2(frames[:, 2], frames[:, 0]))  # of d1, about d2 at S = 0
     couples = 2 * np.array([point["M2"] for point in points])

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contin import Event
-from contin.lowlevel import Collocation, Continuation, Trial
+from contin.lowlevel import Collocation, Continuation, Label, Trial
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.law import Law
 
@@ -74,7 +74,7 @@ def margin(law: Law) -> Callable[[Collocation, np.ndarray], float] | None:
 def closed_tests(law: Law) -> list[Event]:
     """Return the test function that ends a run of a closed strip where the law ends; none if H is a closed expression."""
     least = margin(law)
-    return [Event("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
+    return [Event(Label.END, NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
 
 
 # --- open strips --------------------------------------------------------------------------------------------------------------
@@ -110,7 +110,7 @@ def tests(section: Section, place: Place) -> list[Event]:
     if not law.ends:
         return []
     margin = functools.partial(_convexity if law.ends_with_convexity else _least_margin, section, place)
-    return [Event("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
+    return [Event(Label.END, f"the end of the law {law.name!r}", margin, terminal=True)]
 
 
 def explained(section: Section, tests: Sequence[Event], run: Continuation) -> str | None:

@@ -39,7 +39,7 @@ from contin import (
     solve,
     trace,
 )
-from contin.lowlevel import Collocation, Continuation, Undetermined, locate_branch_point, point_of
+from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads, natural_state
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
@@ -758,10 +758,10 @@ class Network:
         free = [*(name for name in old.free if name not in old.problem.multipliers), *multipliers]
         system = self.problem.discretized(free, values, None, old.mesh, old.degree)
         x = system.pack(np.array(found).T, values)
-        if point.label != "BP":
+        if point.label != Label.BRANCH_POINT:
             return point_of(system, x)
         branch_point = locate_branch_point(system, x)
-        return replace(point_of(system, branch_point.x), label="BP", details=branch_point)
+        return replace(point_of(system, branch_point.x), label=Label.BRANCH_POINT, details=branch_point)
 
     def _moved_by(self, point: Point, guess: Any) -> float:
         """Return by how much a state is away from a guess: quaternions, and places over the longest length."""

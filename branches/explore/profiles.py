@@ -10,14 +10,14 @@ import numpy as np
 
 from branches.explore.packing import column, compressed
 from branches.store.files import StoreError
-from contin.lowlevel import StoredColumns, read_columns
+from contin.lowlevel import Label, StoredColumns, read_columns
 
 #: The column of the size of the states, their root mean square over the nodes.
 NORM = "norm"
 #: Nodes of a profile, at most. Twice as many make pages twice as large; a quarter of them shows corners at steep layers.
 _MOST_NODES = 161
 #: Kinds of labelled points, as the page knows them.
-KINDS = {"LP": "fold", "BP": "secondary", "HB": "hopf", "UZ": "user"}
+KINDS = {Label.FOLD: "fold", Label.BRANCH_POINT: "secondary", Label.HOPF: "hopf", Label.USER_ZERO: "user"}
 
 
 def gathered(files: list[Path]) -> dict:

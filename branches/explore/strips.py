@@ -22,6 +22,7 @@ from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED
 from branches.store.read import read_kind
+from contin.lowlevel import Label
 from ribbon_model import exact
 from ribbon_model.domains import DOMAINS
 from ribbon_model.equilibrium import strains_of
@@ -105,7 +106,7 @@ def _exact(scene: ClosedScene) -> dict:
     except (ArithmeticError, RuntimeError, ValueError) as error:
         return {"none": str(error)}
     places = [{name: getattr(point, name) for name in _MAP} for point in points]
-    return {"points": places, "folds": [place for place, point in zip(places, points) if point.label == "LP"]}
+    return {"points": places, "folds": [place for place, point in zip(places, points) if point.label == Label.FOLD]}
 
 
 def _family(scene: ClosedScene) -> tuple:

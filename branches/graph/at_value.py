@@ -17,7 +17,7 @@ from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.read import read_branch
 from contin import ContinError, ConvergenceError, Settings
-from contin.lowlevel import Collocation, Continuation, correct, point_of
+from contin.lowlevel import Collocation, Continuation, Label, correct, point_of
 from ribbon_model import exact
 
 #: Columns of a state.
@@ -198,6 +198,6 @@ def _followed(branch: StoredBranch, arclength: float, kappa_n: float) -> Iterato
         settings = Settings(direction=int(direction or 1), zeros={"kappa_n": [kappa_n]}, max_points=_STEPS, errors=False)
         with contextlib.suppress(ContinError):
             for point in Continuation(system, x, settings):
-                if point.label == "UZ":
+                if point.label == Label.USER_ZERO:
                     yield point.system.with_free(system.free[1:], point.x)
                     break

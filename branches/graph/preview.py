@@ -18,6 +18,7 @@ from branches.scene.closed import and_nu
 from branches.scene.fields import Scene
 from branches.scene.labels import START, kind_of
 from branches.scene.sweep import Sweep
+from contin.lowlevel import Label
 from ribbon_model import exact
 
 SOURCE = "preview: exact quadrature"
@@ -69,6 +70,7 @@ def _add(graph, family, points):
 
 
 def _node(family, point, number):
-    kind = kind_of(point.label, START if point.label == "BP" else "", "limit", False)  # ends are circles or limits
+    start = START if point.label == Label.BRANCH_POINT else ""  # ends are circles or limits
+    kind = kind_of(point.label, start, "limit", False)
     values = {"kappa_n": point.kappa_n, "kappa_star": point.kappa_star, "energy": point.energy}
     return diagram.node(family, kind, values, number)

@@ -13,7 +13,7 @@ from branches.paper.draw import STABLE, keep
 from branches.paper.page import Row, Section
 from branches.scene.index import LABEL, SymmetryWatch
 from contin import Settings, curve, trace
-from contin.lowlevel import locate_branch_point, point_of
+from contin.lowlevel import Label, locate_branch_point, point_of
 from ribbon_model import exact
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import RIBBON
@@ -45,9 +45,9 @@ def curves(folder: Path) -> Section:
     rows += [
         Row(f"secondary bifurcation of (3, 1) at ν = {nu:.2g}: κₙL/2π =", "", f"{kappa_n:.8f}")
         for label, nu, kappa_n in found
-        if label == "UZ"
+        if label == Label.USER_ZERO
     ]
-    last = next((nu, kappa_n) for label, nu, kappa_n in found if label == "LP")
+    last = next((nu, kappa_n) for label, nu, kappa_n in found if label == Label.FOLD)
     text = f"the two meet there, at κₙL/2π = {last[1]:.1f}; the equations of branch points are nearly singular there"
     rows.append(Row("secondary bifurcations of (3, 1) exist for ν below", "", f"{last[0]:.9f}", text))
     notes = [
@@ -71,13 +71,13 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
     branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
-    fold = branch.labelled("LP")[0]
+    fold = branch.labelled(Label.FOLD)[0]
     moments = [part * fold["M2"] for part in PARTS]
     limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (-200, 200), "M2": (moments[0], 100)}
     options = {"limits": limits, "zeros": {"nu": NUS, "M2": moments[1:]}, "progress": False}
     up, down = (curve(fold, "nu", direction=sense, **options) for sense in (1, -1))
     points = [*reversed(down.points), *up.points[1:]]
-    zeros = [(p["nu"], p["kappa_n"]) for p in points if p.name.startswith("nu = ") and p.label == "UZ"]
+    zeros = [(p["nu"], p["kappa_n"]) for p in points if p.name.startswith("nu = ") and p.label == Label.USER_ZERO]
     values = {min(NUS, key=lambda asked: abs(asked - nu)): kappa_n for nu, kappa_n in zeros}
     near = [(p["M2"], p["nu"]) for p in down.points if p.name.startswith("M2 = ")]
     assert len(near) == len(PARTS)
@@ -93,12 +93,12 @@ def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, 
     first = next(point for point in points if point.label == LABEL)
     system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)
-    start = dataclasses.replace(first, label="BP", system=system, x=found.x, details=found)
+    start = dataclasses.replace(first, label=Label.BRANCH_POINT, system=system, x=found.x, details=found)
     limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (LEFT, 100)}
     options = {"limits": limits, "zeros": {"nu": NUS_SECONDARY}, "max_step": 10.0, "progress": False}
     down, up = (curve(start, "nu", direction=sense, **options) for sense in (-1, 1))
     points = [*reversed(down.points), *up.points[1:]]
-    found = [("UZ" if p.name == "start" else p.label, round(p["nu"], 13) + 0.0, p["kappa_n"]) for p in points]
+    found = [(Label.USER_ZERO if p.name == "start" else p.label, round(p["nu"], 13) + 0.0, p["kappa_n"]) for p in points]
     return np.array([(p["nu"], p["kappa_n"]) for p in points]), found
 
 

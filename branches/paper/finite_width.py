@@ -18,7 +18,7 @@ from branches.run.display import Display
 from branches.run.many import run_many
 from branches.scene.parse import parse
 from contin import Settings, curve, trace
-from contin.lowlevel import point_of
+from contin.lowlevel import Label, point_of
 from ribbon_model import exact
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.linear import thresholds
@@ -87,10 +87,10 @@ def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, {"nu": NU, "Gamma": 10.0}, 10, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
     branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
-    fold = branch.labelled("LP")[0]
+    fold = branch.labelled(Label.FOLD)[0]
     options = {"limits": {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}, "zeros": {"Gamma": CHECKED[1:]}, "progress": False}
     up, down = (curve(fold, "Gamma", direction=sense, **options) for sense in (1, -1))
-    (birth,) = down.labelled("BP")  # the last point
+    (birth,) = down.labelled(Label.BRANCH_POINT)  # the last point
     fold = np.array([(point["Gamma"], point["kappa_n"]) for point in [*reversed(down.points), *up.points[1:]]])
     return fold, (birth["Gamma"], birth["kappa_n"])
 

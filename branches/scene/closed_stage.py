@@ -18,7 +18,7 @@ from branches.scene.fields import ConfigError, StepConfig
 from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
-from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text
+from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text
 from ribbon_model import law_end
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.laws import LAWS, TwoBendings
@@ -112,15 +112,15 @@ class ClosedStage(Stage):
         The fold of kappa_n beside that point belongs to the pitchfork. An end on a circle that is not in the linear theory is
         named "possible".
         """
-        if point.label == "MX":
+        if point.label == Label.FAILED:
             run.stop = self._explained(run)
         if self.scene.origin is not None:
-            if point.label == "LP" and force(point) < _BESIDE:
+            if point.label == Label.FOLD and force(point) < _BESIDE:
                 return None
             if point.name == START or not point.is_simple_branch_point or force(point) >= _NO_FORCE:
                 return point
             run.stop = Stop(PRIMARY, "reached a primary branch, where R = 0")
-            return dataclasses.replace(point, label="EP", name=PRIMARY)
+            return dataclasses.replace(point, label=Label.END, name=PRIMARY)
         if point.name != TRIVIAL:
             return point
         index = covering(self.law, self.scene.law_parameters, point["kappa_n"], point["kappa_star"], point["energy"])
@@ -132,7 +132,7 @@ class ClosedStage(Stage):
             f"{abs(index)}-covered circle",
             "smaller steps may help (steps.largest)",
         )
-        return dataclasses.replace(point, label="MX", name="possible trivial branch")
+        return dataclasses.replace(point, label=Label.FAILED, name="possible trivial branch")
 
     def told(self, run: Continuation, last: Point) -> Stop:
         return run.stop
@@ -294,7 +294,7 @@ def _at_origin(scene: ClosedScene):
     system, x, tangent = seed(primary)
     for point in Continuation(system, x, settings_of(primary), tangent):
         same = abs(point["kappa_star"] - origin.kappa_star) < _SAME_PLACE * (1 + abs(origin.kappa_star))
-        if point.label == "UZ" and same:
+        if point.label == Label.USER_ZERO and same:
             return point
     raise ConfigError(
         f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is not on the branch "

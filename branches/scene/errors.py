@@ -8,7 +8,7 @@ import numpy as np
 
 from branches.scene.labels import label_of
 from contin import Point
-from contin.lowlevel import error, point_of
+from contin.lowlevel import Label, error, point_of
 
 #: An error is given as no less than this part of the largest value of its kind: 16 units in the last place.
 _ROUND_OFF = 16 * float(np.finfo(float).eps)
@@ -24,7 +24,7 @@ def errors_of(point: Point, found: Found) -> dict[str, float]:
     """
     here = found(point)
     place = point.errors.get(point.system.free[0], np.nan)
-    if point.label == "MX" or (label_of(point.label).singular and np.isnan(place)):
+    if point.label == Label.FAILED or (label_of(point.label).singular and np.isnan(place)):
         return dict.fromkeys(here, np.nan)
     errors = error(point, lambda trial: np.array([*found(point_of(trial.system, trial.x)).values()]))
     largest: dict[str, float] = {}

@@ -8,7 +8,7 @@ from threadpoolctl import ThreadpoolController
 from branches.scene.columns import Change
 from branches.scene.stage import Watch
 from contin import ConvergenceError, Event
-from contin.lowlevel import correct
+from contin.lowlevel import Label, correct
 from ribbon_model.law_end import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode
@@ -120,10 +120,10 @@ class SymmetryWatch(Watch):
 
     def change(self, point) -> Change:
         """Return the index on both sides of a fold or secondary bifurcation, from two nearby points on the branch."""
-        if point.label not in ("LP", LABEL):
+        if point.label not in (Label.FOLD, LABEL):
             return Change()
         before, after = (self._beside(point, side) for side in (-1, 1))
-        if point.label == "LP":
+        if point.label == Label.FOLD:
             return Change(before, after, 1)
         return Change(before, after, *_broken(point))
 

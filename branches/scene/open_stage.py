@@ -18,7 +18,7 @@ from branches.scene.labels import CONJUGATE, label_of, without_round_off
 from branches.scene.open_strip import OpenScene, StagedScene
 from branches.scene.stage import Stage, Watch
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
-from contin.lowlevel import Collocation, Continuation, State, Stop, exact_text, point_of
+from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, point_of
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
 from ribbon_model.loads import STROKE
@@ -222,7 +222,7 @@ class OpenStage(Stage):
         """Return the run of a stage from a point."""
         stage, strip = self.stage, self.strip
         changed = origin.system.problem is not strip.problem or bool(stage.numbers)
-        if stage.start_at is not None and stage.start_at.startswith("BP"):
+        if stage.start_at is not None and stage.start_at.startswith(Label.BRANCH_POINT):
             return Continuation(origin.system, origin.x, *self._switched(origin, changed))
         if not changed:
             system, x = origin.system.with_free((stage.follow, *strip.problem.multipliers), origin.x)

@@ -10,7 +10,7 @@ import numpy as np
 
 from branches.run.progress import Progress
 from contin import Settings, trace
-from contin.lowlevel import point_of
+from contin.lowlevel import Label, point_of
 from ribbon_model import law_end, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
@@ -133,9 +133,9 @@ def at_natural_curvatures(
     ends = law_end.closed_tests(FINITE_WIDTH)
     settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
     for point in trace(point_of(system, x), settings, tangent=tangent, progress=False):
-        if point.label == "LP" and folds is not None:
+        if point.label == Label.FOLD and folds is not None:
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))
-        if point.label == "UZ":
+        if point.label == Label.USER_ZERO:
             yield point, Solution.of(point).equilibrium()
 
 

@@ -124,7 +124,7 @@ class Restated:
         """Note the arguments."""
         made = super().__new__(cls)
         names = list(inspect.signature(cls.__init__).parameters)[1:]
-        object.__setattr__(made, "_stated", {**dict(zip(names, arguments)), **options})
+        made._keep(_stated={**dict(zip(names, arguments)), **options})
         return made
 
     def _signatures(self) -> Mapping[str, Arguments]:
