@@ -11,7 +11,7 @@ import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -50,39 +50,39 @@ def plain(name: str) -> str:
     return name if name.isidentifier() else shown(name)
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Return whether a value is a real number; NaN and infinity are, True, False and integers beyond all floats are not."""
     if isinstance(value, int):
         return not isinstance(value, bool) and abs(value) <= sys.float_info.max
     return isinstance(value, (float, np.integer, np.floating))
 
 
-def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
+def number(what: str, value: object, low: float = -math.inf, high: float = math.inf) -> None:
     """Require a number strictly between ``low`` and ``high``."""
     if not (is_number(value) and low < value < high):
         bounds = "a finite number" if math.inf == high == -low else f"a number between {exact_text(low)} and {exact_text(high)}"
         raise ProblemError(f"{what}: {shown(value)} must be {bounds}")
 
 
-def whole(what: str, value: Any, low: int, high: int) -> None:
+def whole(what: str, value: object, low: int, high: int) -> None:
     """Require a whole number from ``low`` to ``high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
         raise ProblemError(f"{what}: {shown(value)} must be a whole number from {low} to {high}")
 
 
-def truth(what: str, value: Any) -> None:
+def truth(what: str, value: object) -> None:
     """Require True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise ProblemError(f"{what}: {shown(value)} must be True or False")
 
 
-def instance(what: str, value: Any, kind: type | tuple[type, ...], called: str) -> None:
+def instance(what: str, value: object, kind: type | tuple[type, ...], called: str) -> None:
     """Require an object of a class; ``called`` names it in the message."""
     if not isinstance(value, kind):
         raise ProblemError(f"{what}: {shown(value)} must be {called}")
 
 
-def function(what: str, value: Any) -> Callable[..., Any]:
+def function(what: str, value: object) -> Callable[..., Any]:
     """Require something that can be called, and return it."""
     if not callable(value):
         raise ProblemError(f"{what}: {shown(value)} must be a function")
@@ -90,23 +90,22 @@ def function(what: str, value: Any) -> Callable[..., Any]:
     return found
 
 
-def mapping(what: str, value: Any, holds: str) -> Mapping[str, Any]:
+def mapping(what: str, value: object, holds: str) -> Mapping[str, Any]:
     """Require a mapping from names to what it ``holds``, and return it."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise ProblemError(f"{what}: {shown(value)} must be a dict from names to {holds}")
     return value
 
 
-def sequence(what: str, value: Any, holds: str) -> Sequence[Any]:
+def sequence(what: str, value: object, holds: str) -> Sequence[Any]:
     """Require a list, a tuple or an array of one dimension, and return it; text is none of them."""
     array = isinstance(value, np.ndarray) and value.ndim == 1
     if not array and (not isinstance(value, Sequence) or isinstance(value, (str, bytes))):
         raise ProblemError(f"{what}: {shown(value)} must be a list of {holds}")
-    found: Sequence[Any] = value
-    return found
+    return cast(Sequence[Any], value)
 
 
-def names(what: str, value: Any) -> tuple[str, ...]:
+def names(what: str, value: object) -> tuple[str, ...]:
     """Require a list of names, and return it as a tuple."""
     found = tuple(sequence(what, value, "names"))
     if not all(isinstance(name, str) for name in found):
@@ -114,7 +113,7 @@ def names(what: str, value: Any) -> tuple[str, ...]:
     return found
 
 
-def chosen(what: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
+def chosen(what: str, value: object, known: Sequence[str]) -> tuple[str, ...]:
     """Require different names among those that are known, and return them."""
     found = names(what, value)
     for name in found:
@@ -125,7 +124,7 @@ def chosen(what: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
     return found
 
 
-def array(what: str, value: Any, shape: tuple[int, ...]) -> Array:
+def array(what: str, value: object, shape: tuple[int, ...]) -> Array:
     """Require finite numbers of a shape, and return them as an array."""
     try:
         found = np.asarray(value, dtype=float)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function, Places
+from contin.arrays import Array, Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.degree import CYCLE_DEGREE
 from contin.core.scales import Scales
@@ -427,7 +427,7 @@ _STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.Wea
 def _scaled_by_forcing(field: Function, period: Function) -> Function:
     """Return a forced field times the period, at the time from 0 to 1."""
 
-    def rhs(t: Any, u: Any, p: Any) -> Any:
+    def rhs(t: float, u: Named, p: Named) -> Sequence[float]:
         duration = p.rounds * period(p)
         return [duration * rate for rate in field(duration * t, u, p)]
 
@@ -438,7 +438,7 @@ def _periodic(turn: Array, names: Sequence[str], angles: Mapping[str, float]) ->
     """Return the boundary conditions S u(0) - u(1) = 0; angles gain whole rounds."""
     rows, rounds = turn.tolist(), [(names.index(name), WINDING + name, period) for name, period in angles.items()]
 
-    def boundary(a: Any, b: Any, p: Any) -> Any:
+    def boundary(a: Sequence[float], b: Sequence[float], p: Named) -> Sequence[float]:
         gaps = [turned - end for turned, end in zip(image(rows, a), b)]
         for place, winding, period in rounds:
             gaps[place] = gaps[place] + period * getattr(p, winding)
@@ -448,14 +448,14 @@ def _periodic(turn: Array, names: Sequence[str], angles: Mapping[str, float]) ->
 
 
 def _of_time(function: Function) -> Function:
-    def mean(t: Any, u: Any, p: Any) -> Any:
+    def mean(t: float, u: Named, p: Named) -> Any:
         return function(u, p)
 
     return mean
 
 
 def _of_forcing(function: Function, period: Function) -> Function:
-    def mean(t: Any, u: Any, p: Any) -> Any:
+    def mean(t: float, u: Named, p: Named) -> Any:
         return function(p.rounds * period(p) * t, u, p)
 
     return mean

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,13 @@ from contin.arrays import Array
 from contin.functions import round_off
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import (
+    Builder,
     IndexMatrix,
     IndexVector,
     Matrix,
     Stack,
+    Type,
+    Value,
     Vector,
     constant,
     double,
@@ -40,9 +43,6 @@ from contin.functions.kernel_parts import (
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, TIME, Inputs, Program, program
 from contin.functions.tape import Tape
-
-if TYPE_CHECKING:
-    from llvmlite import ir
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
 #: twice as often.
@@ -88,34 +88,34 @@ class Widths(NamedTuple):
 class _Writer:
     """Writes the body of one case: ``d``, ``a``, ``b``, ``c`` are the numbers in the instruction's row."""
 
-    def __init__(self, builder: ir.IRBuilder, memory: Memory, widths: Widths, lanes: ir.Value) -> None:
+    def __init__(self, builder: Builder, memory: Memory, widths: Widths, lanes: Value) -> None:
         self.builder, self.memory, self.widths, self.lanes = builder, memory, widths, lanes
         self.groups = builder.udiv(builder.add(lanes, _number(_GROUP - 1)), _number(_GROUP))
         self.d = self.a = self.b = self.c = None
 
-    def register(self, number: ir.Value) -> Any:
+    def register(self, number: Value) -> Value:
         return self.builder.add(self.memory.registers, self.builder.mul(number, _number(_REGISTER)))
 
-    def entry(self, base: ir.Value, number: ir.Value) -> Any:
+    def entry(self, base: Value, number: Value) -> Value:
         return self.builder.add(base, self.builder.mul(number, _number(8)))
 
-    def load(self, address: ir.Value, kind: ir.Type | None = None) -> Any:
+    def load(self, address: Value, kind: Type | None = None) -> Value:
         value = self.builder.load(self.builder.inttoptr(address, (kind or double()).as_pointer()))
         value.align = 8
         return value
 
-    def store(self, value: ir.Value, address: ir.Value) -> None:
+    def store(self, value: Value, address: Value) -> None:
         self.builder.store(value, self.builder.inttoptr(address, value.type.as_pointer())).align = 8
 
-    def scalar(self, number: ir.Value) -> Any:
+    def scalar(self, number: Value) -> Value:
         return self.load(self.entry(self.memory.scalars, number))
 
-    def splat(self, value: ir.Value) -> Any:
+    def splat(self, value: Value) -> Value:
         none = constant(_group(), llvm().Undefined)
         first = self.builder.insert_element(none, value, constant(whole(32), 0))
         return self.builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), _GROUP), [0] * _GROUP))
 
-    def vector(self, value: Callable[..., Any], operands: list[Any], scalars: list[Any]) -> None:
+    def vector(self, value: Callable[..., Value], operands: list[Value], scalars: list[Value]) -> None:
         """d = value(operands, scalars), eight lanes at a time; scalars are the same in all."""
         builder = self.builder
         target, sources = self.register(self.d), [self.register(operand) for operand in operands]
@@ -125,7 +125,7 @@ class _Writer:
             values = [self.load(builder.add(source, offset), _group()) for source in sources]
             self.store(value(*values, *wide), builder.add(target, offset))
 
-    def each(self, value: Callable[..., Any], operands: list[Any]) -> None:
+    def each(self, value: Callable[..., Value], operands: list[Value]) -> None:
         """d = value(operands), lane by lane."""
         builder = self.builder
         target, sources = self.register(self.d), [self.register(operand) for operand in operands]
@@ -133,14 +133,14 @@ class _Writer:
             values = [self.load(self.entry(source, loop.index)) for source in sources]
             self.store(value(*values), self.entry(target, loop.index))
 
-    def gather(self, base: ir.Value, width: ir.Value) -> None:
+    def gather(self, base: Value, width: Value) -> None:
         """d = a column of an array, point by point."""
         builder = self.builder
         target = self.register(self.d)
         with for_range(builder, self.lanes) as loop:
             self.store(self.load(builder.add(base, builder.mul(loop.index, width))), self.entry(target, loop.index))
 
-    def scatter(self, base: ir.Value, width: ir.Value, scalar: bool) -> None:
+    def scatter(self, base: Value, width: Value, scalar: bool) -> None:
         """Store register or scalar a in column d of an array."""
         builder = self.builder
         base = self.entry(base, self.d)
@@ -150,7 +150,7 @@ class _Writer:
             found = value if scalar else self.load(self.entry(source, loop.index))
             self.store(found, builder.add(base, builder.mul(loop.index, width)))
 
-    def many(self, term: Callable[[Any, Any], Any]) -> None:
+    def many(self, term: Callable[[Value, Value], Value]) -> None:
         """d = sum of b terms; ``term(number, offset)`` returns one of them, for eight lanes."""
         builder = self.builder
         target = self.register(self.d)
@@ -162,55 +162,55 @@ class _Writer:
                 builder.store(builder.fadd(builder.load(total), following), total)
             self.store(builder.load(total), builder.add(target, offset))
 
-    def listed(self, number: ir.Value) -> Any:
+    def listed(self, number: Value) -> Value:
         """Return a number of the list that begins at a."""
         return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), whole())
 
-    def lane(self, register: ir.Value, offset: ir.Value) -> Any:
+    def lane(self, register: Value, offset: Value) -> Value:
         """Return eight lanes of a register."""
         return self.load(self.builder.add(self.register(register), offset), _group())
 
 
-def _group() -> Any:
+def _group() -> Type:
     """Return LLVM's type of a group."""
     return llvm().VectorType(double(), _GROUP)
 
 
-def _number(value: int) -> Any:
+def _number(value: int) -> Value:
     return constant(whole(), value)
 
 
-def _intrinsic(builder: ir.IRBuilder, name: str) -> Callable[[Any], Any]:
+def _intrinsic(builder: Builder, name: str) -> Callable[[Value], Value]:
     full = f"llvm.{name}.v{_GROUP}f64"
     kind = llvm().FunctionType(_group(), [_group()])
     function = builder.module.globals.get(full) or llvm().Function(builder.module, kind, full)
     return lambda x: builder.call(function, [x])
 
 
-def _truth(builder: ir.IRBuilder, condition: ir.Value) -> Any:
+def _truth(builder: Builder, condition: Value) -> Value:
     return builder.uitofp(condition, _group())
 
 
-def _zeros() -> Any:
+def _zeros() -> Value:
     return constant(_group(), [0.0] * _GROUP)
 
 
-def _sign(builder: ir.IRBuilder, x: ir.Value) -> Any:
+def _sign(builder: Builder, x: Value) -> Value:
     one, minus = (constant(_group(), [value] * _GROUP) for value in (1.0, -1.0))
     below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
     return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
 
 
-def _chosen(builder: ir.IRBuilder, condition: ir.Value, a: ir.Value, b: ir.Value) -> Any:
+def _chosen(builder: Builder, condition: Value, a: Value, b: Value) -> Value:
     return builder.select(builder.fcmp_unordered("!=", condition, _zeros()), a, b)
 
 
-def _product(builder: ir.IRBuilder, x: ir.Value, y: ir.Value) -> Any:
+def _product(builder: Builder, x: Value, y: Value) -> Value:
     zero = builder.or_(builder.fcmp_ordered("==", x, _zeros()), builder.fcmp_ordered("==", y, _zeros()))
     return builder.select(zero, _zeros(), builder.fmul(x, y))
 
 
-def _arithmetic(builder: ir.IRBuilder) -> dict[str, tuple[Callable[..., Any], int, int]]:
+def _arithmetic(builder: Builder) -> dict[str, tuple[Callable[..., Value], int, int]]:
     """Return by name: the value for eight lanes, and how many operands are registers and how many scalars."""
     add, sub, mul, div = builder.fadd, builder.fsub, builder.fmul, builder.fdiv
     found = {
@@ -229,13 +229,13 @@ def _arithmetic(builder: ir.IRBuilder) -> dict[str, tuple[Callable[..., Any], in
     return {**found, **{name: (_intrinsic(builder, intrinsic), 1, 0) for name, intrinsic in intrinsics.items()}}
 
 
-def _library(builder: ir.IRBuilder, name: str) -> tuple[Callable[..., Any], int]:
+def _library(builder: Builder, name: str) -> tuple[Callable[..., Value], int]:
     """Return the value of a function of the C library for one lane, and the number of its operands."""
     external, count = TABLE[name].external, 2 if name in OF_TWO else 1
     kind = llvm().FunctionType(double(), [double()] * count)
     function = builder.module.globals.get(external) or llvm().Function(builder.module, kind, external)
 
-    def value(*given: ir.Value) -> Any:
+    def value(*given: Value) -> Value:
         found = builder.call(function, given)
         if name != "mod":
             return found
@@ -251,7 +251,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
     """Return what writes each case, by name."""
     builder, memory, widths = write.builder, write.memory, write.widths
 
-    def registers(value: Callable[..., ir.Value], count: int, scalars: int) -> None:
+    def registers(value: Callable[..., Value], count: int, scalars: int) -> None:
         if count == 1 and scalars:
             write.vector(value, [write.a], [write.b])
         else:
@@ -260,11 +260,11 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
     def fused_scalar() -> None:
         write.vector(lambda x, z, s: builder.fadd(builder.fmul(x, s), z), [write.a, write.c], [write.b])
 
-    def linear(number: ir.Value, offset: ir.Value) -> Any:
+    def linear(number: Value, offset: Value) -> Value:
         factor = write.splat(write.scalar(write.listed(builder.add(number, write.b))))
         return builder.fmul(factor, write.lane(write.listed(number), offset))
 
-    def dot(number: ir.Value, offset: ir.Value) -> Any:
+    def dot(number: Value, offset: Value) -> Value:
         other = write.lane(write.listed(builder.add(number, write.b)), offset)
         return builder.fmul(write.lane(write.listed(number), offset), other)
 
@@ -294,7 +294,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
 
 
 @instruction
-def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
+def interpret(builder: Builder, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
     """Run the instructions from ``first`` to ``last``; return the number of one that is none of these, or ``last``."""
     write = _Writer(builder, memory, widths, lanes)
     place = variable(builder, first)
@@ -484,7 +484,7 @@ def _give_up(work, lists, row, lanes):
 
 
 @instruction
-def _address(builder: Any, array: Any, offset: int) -> int:
+def _address(builder: Builder, array: Any, offset: int) -> int:
     """Return an address in an array."""
     there: int = builder.add(array.address, offset)
     return there
@@ -567,12 +567,12 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 
 @instruction
-def _bits(builder: Any, value: float) -> int:
+def _bits(builder: Builder, value: float) -> int:
     return builder.bitcast(value, whole())  # type: ignore[no-any-return]
 
 
 @instruction
-def _number_of(builder: Any, bits: int) -> float:
+def _number_of(builder: Builder, bits: int) -> float:
     return builder.bitcast(bits, double())  # type: ignore[no-any-return]
 
 

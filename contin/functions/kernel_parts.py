@@ -6,9 +6,18 @@ import functools
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from types import CodeType, ModuleType
-from typing import Annotated, Any, Concatenate, NamedTuple, ParamSpec, TypeVar, overload
+from typing import TYPE_CHECKING, Annotated, Any, Concatenate, NamedTuple, ParamSpec, TypeAlias, TypeVar, overload
 
 from contin.arrays import Array, Indices
+
+if TYPE_CHECKING:
+    from llvmlite import ir
+
+    Builder: TypeAlias = ir.IRBuilder
+    Type: TypeAlias = ir.Type
+    Value: TypeAlias = ir.Value
+else:  # the annotations of instructions are evaluated, and only the compiler imports LLVM's language
+    Builder = Type = Value = object
 
 
 class Kind(NamedTuple):
@@ -136,7 +145,7 @@ _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 
 
-def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Callable[_Parameters, _Result]:
+def instruction(write: Callable[Concatenate[Builder, _Parameters], _Result]) -> Callable[_Parameters, _Result]:
     """Let kernels call a function that writes its own machine code, in LLVM's language.
 
     ``write(builder, *arguments)`` appends the body of the function with an ``llvmlite.ir.IRBuilder`` and returns its value. Its
@@ -145,7 +154,7 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
     a `Place`. For example, a rounded sum of two numbers::
 
         @instruction
-        def sum(builder: Any, x: float, y: float) -> float:
+        def sum(builder: Builder, x: float, y: float) -> float:
             return builder.fadd(x, y)
 
     The body is written once, as a function that all calls share.
@@ -161,17 +170,17 @@ def llvm() -> Any:
     return ir
 
 
-def double() -> Any:
+def double() -> Type:
     """Return LLVM's type of floating-point numbers."""
     return llvm().DoubleType()
 
 
-def whole(bits: int = 64) -> Any:
+def whole(bits: int = 64) -> Type:
     """Return LLVM's type of whole numbers."""
     return llvm().IntType(bits)
 
 
-def constant(kind: Any, value: Any) -> Any:
+def constant(kind: Type, value: object) -> Value:
     """Return a constant of LLVM's language."""
     return llvm().Constant(kind, value)
 
@@ -179,18 +188,18 @@ def constant(kind: Any, value: Any) -> Any:
 class Place:
     """An array of any kind, as an instruction sees it: the address of its first entry, and the bytes from one to the next."""
 
-    def __init__(self, address: Any, *strides: Any) -> None:
+    def __init__(self, address: Value, *strides: Value) -> None:
         self.address, self.strides = address, strides
 
 
-def for_range(builder: Any, count: Any) -> Any:
+def for_range(builder: Builder, count: Value) -> Any:
     """In an instruction: ``with for_range(builder, count) as loop`` writes a loop, with ``loop.index``."""
     from numba.core import cgutils  # only the compiler calls instructions
 
     return cgutils.for_range(builder, count)
 
 
-def variable(builder: Any, value: Any) -> Any:
+def variable(builder: Builder, value: Value) -> Value:
     """In an instruction: return a place on the stack that holds a value."""
     from numba.core import cgutils
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from contin.functions.kernel_parts import constant, double, for_range, instruction, llvm, variable, whole
+from contin.functions.kernel_parts import Builder, Value, constant, double, for_range, instruction, llvm, variable, whole
 
 #: Columns that are updated at a time: a vector register of AVX-512. From 4 to 64 all matrices take the same time.
 _WIDTH = 8
@@ -37,32 +37,32 @@ class Rows(NamedTuple):
 
 
 @instruction
-def address(builder: Any, array: Any, offset: int) -> int:
+def address(builder: Builder, array: Any, offset: int) -> int:
     """Return an address in an array."""
     there: int = builder.add(array.address, offset)
     return there
 
 
 @instruction
-def at(builder: Any, matrix: Any, i: int, j: int) -> Rows:
+def at(builder: Builder, matrix: Any, i: int, j: int) -> Rows:
     """Return the rows of a matrix from entry (i, j) on."""
     return _within(builder, Rows(matrix.address, matrix.strides[0]), i, j)
 
 
 @instruction
-def page(builder: Any, stack: Any, j: int) -> Rows:
+def page(builder: Builder, stack: Any, j: int) -> Rows:
     """Return the rows of a stack's matrix j."""
     return Rows(builder.add(stack.address, builder.mul(j, stack.strides[0])), stack.strides[1])
 
 
 @instruction
-def within(builder: Any, rows: Rows, i: int, j: int) -> Rows:
+def within(builder: Builder, rows: Rows, i: int, j: int) -> Rows:
     """Return the rows of a block from entry (i, j) on."""
     return _within(builder, rows, i, j)
 
 
 @instruction
-def entry(builder: Any, vector: int, i: int) -> int:
+def entry(builder: Builder, vector: int, i: int) -> int:
     """Return the address of an entry of a vector whose entries are `LANES` numbers."""
     there: int = _entry(builder, vector, i)
     return there
@@ -72,17 +72,17 @@ def entry(builder: Any, vector: int, i: int) -> int:
 
 
 @instruction
-def subtract_products(builder: Any, target: Rows, factors: Rows, pivots: Rows, length: int, rows: int, count: int) -> None:
+def subtract_products(builder: Builder, target: Rows, factors: Rows, pivots: Rows, length: int, rows: int, count: int) -> None:
     """target[r, :length] -= sum over k of factors[r, k] * pivots[k, :length], for r < ``rows`` and k < ``count`` <= `PANEL`."""
 
-    def subtract(first: Any, together: int, size: int) -> None:
+    def subtract(first: Value, together: int, size: int) -> None:
         targets, sources = _rows(builder, _below(builder, target, first), together), _rows(builder, pivots, size)
         multipliers = [
             [builder.fneg(_load(builder, _right(builder, row, k))) for k in range(size)]
             for row in _rows(builder, _below(builder, factors, first), together)
         ]
 
-        def tile(offset: Any, width: int) -> None:
+        def tile(offset: Value, width: int) -> None:
             above = [_load(builder, builder.add(source, offset), width) for source in sources]
             for row, multiplier in zip(targets, multipliers):
                 there = builder.add(row, offset)
@@ -105,7 +105,7 @@ def subtract_products(builder: Any, target: Rows, factors: Rows, pivots: Rows, l
 
 
 @instruction
-def solve_triangle(builder: Any, rows: Rows, factors: Rows, length: int, count: int) -> None:
+def solve_triangle(builder: Builder, rows: Rows, factors: Rows, length: int, count: int) -> None:
     """rows[k, :length] -= sum over l < k of factors[k, l] * rows[l, :length], for k = 1 ... ``count`` - 1 < `PANEL`."""
 
     def write(size: int) -> None:
@@ -115,8 +115,8 @@ def solve_triangle(builder: Any, rows: Rows, factors: Rows, length: int, count: 
             for r, row in enumerate(_rows(builder, factors, size))
         ]
 
-        def tile(offset: Any, width: int) -> None:
-            done: list[Any] = []
+        def tile(offset: Value, width: int) -> None:
+            done: list[Value] = []
             for place, multiplier in zip(places, multipliers):
                 there = builder.add(place, offset)
                 total = _load(builder, there, width)
@@ -131,7 +131,7 @@ def solve_triangle(builder: Any, rows: Rows, factors: Rows, length: int, count: 
 
 
 @instruction
-def reduce_column(builder: Any, pivot: Rows, count: int, column: int, size: int) -> int:
+def reduce_column(builder: Builder, pivot: Rows, count: int, column: int, size: int) -> int:
     """Eliminate one column of a panel from the ``count`` rows below its pivot row, within the panel.
 
     ``pivot`` is the panel from the pivot row on: `PANEL` columns that must exist, of which ``size`` belong to it. Multipliers
@@ -170,7 +170,7 @@ def reduce_column(builder: Any, pivot: Rows, count: int, column: int, size: int)
 
 
 @instruction
-def invert_triangles(builder: Any, block: Rows, count: int) -> None:
+def invert_triangles(builder: Builder, block: Rows, count: int) -> None:
     """Put the inverses in place of both triangles of a block (count, count), the lower one with ones on its diagonal.
 
     ``count`` <= `PANEL`.
@@ -179,9 +179,9 @@ def invert_triangles(builder: Any, block: Rows, count: int) -> None:
     def write(size: int) -> None:
         places = [[_right(builder, row, c) for c in range(size)] for row in _rows(builder, block, size)]
         old = [[_load(builder, place) for place in row] for row in places]
-        new: dict[tuple[int, int], Any] = {}
+        new: dict[tuple[int, int], Value] = {}
 
-        def product(r: int, c: int, between: range, total: Any) -> Any:
+        def product(r: int, c: int, between: range, total: Value) -> Value:
             for k in between:
                 term = builder.fmul(new[r, k], old[k][c]) if r < c else builder.fmul(old[r][k], new[k, c])
                 total = term if total is None else builder.fadd(total, term)
@@ -201,7 +201,7 @@ def invert_triangles(builder: Any, block: Rows, count: int) -> None:
 
 
 @instruction
-def multiply_rows(builder: Any, rows: Rows, number: int, block: Rows, count: int) -> None:
+def multiply_rows(builder: Builder, rows: Rows, number: int, block: Rows, count: int) -> None:
     """rows[i, :count] = rows[i, :count] @ the upper triangle of the block (count, count), for i < ``number``; count <= `PANEL`.
 
     Rows and block must reach to `PANEL` columns.
@@ -226,10 +226,10 @@ def multiply_rows(builder: Any, rows: Rows, number: int, block: Rows, count: int
 
 
 @instruction
-def exchange(builder: Any, a: int, b: int, length: int) -> None:
+def exchange(builder: Builder, a: int, b: int, length: int) -> None:
     """Exchange ``length`` numbers at two addresses."""
 
-    def tile(offset: Any, width: int) -> None:
+    def tile(offset: Value, width: int) -> None:
         places = [builder.add(address, offset) for address in (a, b)]
         values = [_load(builder, place, width) for place in places]
         for value, place in zip(values, places[::-1]):
@@ -239,22 +239,22 @@ def exchange(builder: Any, a: int, b: int, length: int) -> None:
 
 
 @instruction
-def copy_rows(builder: Any, target: Rows, source: Rows, length: int, rows: int) -> None:
+def copy_rows(builder: Builder, target: Rows, source: Rows, length: int, rows: int) -> None:
     """target[r, :length] = source[r, :length] for r < ``rows``."""
     with for_range(builder, rows) as loop:
         there, here = (_below(builder, matrix, loop.index).address for matrix in (target, source))
 
-        def tile(offset: Any, width: int) -> None:
+        def tile(offset: Value, width: int) -> None:
             _store(builder, _load(builder, builder.add(here, offset), width), builder.add(there, offset))
 
         _for_tiles(builder, length, tile)
 
 
 @instruction
-def scale_into(builder: Any, target: int, factor: float, source: int, length: int) -> None:
+def scale_into(builder: Builder, target: int, factor: float, source: int, length: int) -> None:
     """target[:length] = factor * source[:length], for two addresses."""
 
-    def tile(offset: Any, width: int) -> None:
+    def tile(offset: Value, width: int) -> None:
         values = _load(builder, builder.add(source, offset), width)
         _store(builder, builder.fmul(_splat(builder, factor, width), values), builder.add(target, offset))
 
@@ -265,15 +265,15 @@ def scale_into(builder: Any, target: int, factor: float, source: int, length: in
 
 
 @instruction
-def subtract_rows(builder: Any, target: int, matrix: Rows, vectors: int, length: int, rows: int) -> None:
+def subtract_rows(builder: Builder, target: int, matrix: Rows, vectors: int, length: int, rows: int) -> None:
     """target[r] -= sum over j < ``length`` of matrix[r, j] * vectors[j], for r < ``rows``."""
 
-    def subtract(first: Any, together: int) -> None:
+    def subtract(first: Value, together: int) -> None:
         ours = _rows(builder, _below(builder, matrix, first), together)
         zero = constant(llvm().VectorType(double(), LANES), [0.0] * LANES)
         totals = [[variable(builder, zero) for _ in ours] for _ in range(2)]  # two sums, so that one need not wait
 
-        def add(j: Any, places: list[Any]) -> None:
+        def add(j: Value, places: list[Value]) -> None:
             value = _load(builder, _entry(builder, vectors, j), LANES)
             for row, place in zip(ours, places):
                 factor = _load(builder, builder.add(row, builder.mul(j, _number(8))))
@@ -296,10 +296,10 @@ def subtract_rows(builder: Any, target: int, matrix: Rows, vectors: int, length:
 
 
 @instruction
-def subtract_columns(builder: Any, target: int, matrix: Rows, vectors: int, length: int, rows: int) -> None:
+def subtract_columns(builder: Builder, target: int, matrix: Rows, vectors: int, length: int, rows: int) -> None:
     """target[j] -= sum over r < ``rows`` of matrix[r, j] * vectors[r], for j < ``length``."""
 
-    def subtract(first: Any, together: int) -> None:
+    def subtract(first: Value, together: int) -> None:
         ours = _rows(builder, _below(builder, matrix, first), together)
         places = [_entry(builder, vectors, builder.add(first, _number(r))) for r in range(together)]
         values = [builder.fneg(_load(builder, place, LANES)) for place in places]
@@ -315,30 +315,30 @@ def subtract_columns(builder: Any, target: int, matrix: Rows, vectors: int, leng
 
 
 @instruction
-def apply_lower(builder: Any, vectors: int, block: Rows, count: int) -> None:
+def apply_lower(builder: Builder, vectors: int, block: Rows, count: int) -> None:
     """vectors = L vectors, with the lower triangle L of the block (count, count), ones on its diagonal; count <= `PANEL`."""
     _apply(builder, vectors, block, count, lower=True, transposed=False)
 
 
 @instruction
-def apply_upper(builder: Any, vectors: int, block: Rows, count: int) -> None:
+def apply_upper(builder: Builder, vectors: int, block: Rows, count: int) -> None:
     """vectors = U vectors, with the upper triangle U of the block (count, count); count <= `PANEL`."""
     _apply(builder, vectors, block, count, lower=False, transposed=False)
 
 
 @instruction
-def apply_lower_transposed(builder: Any, vectors: int, block: Rows, count: int) -> None:
+def apply_lower_transposed(builder: Builder, vectors: int, block: Rows, count: int) -> None:
     """vectors = L^T vectors, with the L of `apply_lower`."""
     _apply(builder, vectors, block, count, lower=True, transposed=True)
 
 
 @instruction
-def apply_upper_transposed(builder: Any, vectors: int, block: Rows, count: int) -> None:
+def apply_upper_transposed(builder: Builder, vectors: int, block: Rows, count: int) -> None:
     """vectors = U^T vectors, with the U of `apply_upper`."""
     _apply(builder, vectors, block, count, lower=False, transposed=True)
 
 
-def _apply(builder: Any, vectors: Any, block: Rows, count: Any, lower: bool, transposed: bool) -> None:
+def _apply(builder: Builder, vectors: Value, block: Rows, count: Value, lower: bool, transposed: bool) -> None:
     """Write the product of a triangle and ``count`` vectors."""
 
     def write(size: int) -> None:
@@ -357,25 +357,25 @@ def _apply(builder: Any, vectors: Any, block: Rows, count: Any, lower: bool, tra
 
 
 @instruction
-def move(builder: Any, target: int, source: int) -> None:
+def move(builder: Builder, target: int, source: int) -> None:
     """Copy one entry, `LANES` numbers, from an address to another."""
     _store(builder, _load(builder, source, LANES), target)
 
 
 @instruction
-def add(builder: Any, target: int, source: int) -> None:
+def add(builder: Builder, target: int, source: int) -> None:
     """Add one entry at an address to that at another."""
     _store(builder, builder.fadd(_load(builder, target, LANES), _load(builder, source, LANES)), target)
 
 
 @instruction
-def clear(builder: Any, target: int) -> None:
+def clear(builder: Builder, target: int) -> None:
     """Make one entry zero."""
     _store(builder, constant(llvm().VectorType(double(), LANES), [0.0] * LANES), target)
 
 
 @instruction
-def side_by_side(builder: Any, target: int, source: Rows, length: int, rows: int) -> None:
+def side_by_side(builder: Builder, target: int, source: Rows, length: int, rows: int) -> None:
     """target[i] = source[:LANES, i] for i < ``length``; where there are fewer ``rows``, the last of them again."""
     places = [source.address]
     for lane in range(1, LANES):
@@ -390,7 +390,7 @@ def side_by_side(builder: Any, target: int, source: Rows, length: int, rows: int
 
 
 @instruction
-def apart(builder: Any, target: Rows, source: int, length: int, rows: int) -> None:
+def apart(builder: Builder, target: Rows, source: int, length: int, rows: int) -> None:
     """target[r, i] = source[i, r] for i < ``length`` and r < min(``rows``, `LANES`)."""
 
     def write(size: int) -> None:
@@ -408,38 +408,38 @@ def apart(builder: Any, target: Rows, source: int, length: int, rows: int) -> No
 # --- parts of the bodies ---------------------------------------------------------------------------------------------
 
 
-def _number(value: int) -> Any:
+def _number(value: int) -> Value:
     """Return a constant of the machine's integers."""
     return constant(whole(), value)
 
 
-def _below(builder: Any, rows: Rows, first: Any) -> Rows:
+def _below(builder: Builder, rows: Rows, first: Value) -> Rows:
     """Return the rows from the ``first`` on."""
     return Rows(builder.add(rows.address, builder.mul(rows.stride, first)), rows.stride)
 
 
-def _within(builder: Any, rows: Rows, i: Any, j: Any) -> Rows:
+def _within(builder: Builder, rows: Rows, i: Value, j: Value) -> Rows:
     """Return the rows from entry (i, j) on."""
     below = _below(builder, rows, i)
     return Rows(builder.add(below.address, builder.mul(j, _number(8))), below.stride)
 
 
-def _rows(builder: Any, rows: Rows, count: int) -> list[Any]:
+def _rows(builder: Builder, rows: Rows, count: int) -> list[Value]:
     """Return the addresses of the first ``count`` rows."""
     return [_below(builder, rows, _number(r)).address for r in range(count)]
 
 
-def _right(builder: Any, row: Any, column: int) -> Any:
+def _right(builder: Builder, row: Value, column: int) -> Value:
     """Return the address of an entry of a row."""
     return builder.add(row, _number(8 * column))
 
 
-def _entry(builder: Any, vectors: Any, index: Any) -> Any:
+def _entry(builder: Builder, vectors: Value, index: Value) -> Value:
     """Return the address of an entry of a vector whose entries are `LANES` numbers."""
     return builder.add(vectors, builder.mul(index, _number(8 * LANES)))
 
 
-def _load(builder: Any, address: Any, width: int = 0) -> Any:
+def _load(builder: Builder, address: Value, width: int = 0) -> Value:
     """Return the number at an address, or the vector of ``width`` numbers."""
     kind = llvm().VectorType(double(), width) if width else double()
     value = builder.load(builder.inttoptr(address, kind.as_pointer()))
@@ -447,25 +447,25 @@ def _load(builder: Any, address: Any, width: int = 0) -> Any:
     return value
 
 
-def _store(builder: Any, value: Any, address: Any) -> None:
+def _store(builder: Builder, value: Value, address: Value) -> None:
     """Store a number or a vector at an address."""
     builder.store(value, builder.inttoptr(address, value.type.as_pointer())).align = 8
 
 
-def _splat(builder: Any, value: Any, width: int) -> Any:
+def _splat(builder: Builder, value: Value, width: int) -> Value:
     """Return a vector with the same value in all places."""
     none = constant(llvm().VectorType(value.type, width), llvm().Undefined)
     first = builder.insert_element(none, value, constant(whole(32), 0))
     return builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), width), [0] * width))
 
 
-def _plus(builder: Any, total: Any, factor: Any, vector: Any) -> Any:
+def _plus(builder: Builder, total: Value, factor: Value, vector: Value) -> Value:
     """Return total + factor * vector, for a number and two vectors; the product alone if there is no total."""
     product = builder.fmul(_splat(builder, factor, vector.type.count), vector)
     return product if total is None else builder.fadd(total, product)
 
 
-def _for_tiles(builder: Any, length: Any, tile: Callable[[Any, int], None]) -> None:
+def _for_tiles(builder: Builder, length: Value, tile: Callable[[Value, int], None]) -> None:
     """Write ``tile(offset in bytes, width)`` for ``length`` numbers: `_WIDTH` at a time, then half as many, and so on."""
     whole = builder.udiv(length, _number(_WIDTH))
     with for_range(builder, whole) as loop:
@@ -479,7 +479,7 @@ def _for_tiles(builder: Any, length: Any, tile: Callable[[Any, int], None]) -> N
         width //= 2
 
 
-def _for_size(builder: Any, size: Any, write: Callable[[int], None], smallest: int = 1, largest: int = PANEL) -> None:
+def _for_size(builder: Builder, size: Value, write: Callable[[int], None], smallest: int = 1, largest: int = PANEL) -> None:
     """Write ``write(case)`` for each size in a range, and the choice among them by ``size``; other sizes do nothing."""
     end = builder.append_basic_block()
     choice = builder.switch(size, end)
@@ -492,7 +492,7 @@ def _for_size(builder: Any, size: Any, write: Callable[[int], None], smallest: i
     builder.position_at_end(end)
 
 
-def _for_panels(builder: Any, rows: Any, write: Callable[[Any, int], None]) -> None:
+def _for_panels(builder: Builder, rows: Value, write: Callable[[Value, int], None]) -> None:
     """Write ``write(first row, number of rows)`` for all rows: `PANEL` at a time, then for the rest at once."""
     whole = builder.udiv(rows, _number(PANEL))
     with for_range(builder, whole) as loop:
