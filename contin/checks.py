@@ -164,7 +164,7 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     return checked
 
 
-def fields(record: Any) -> None:
+def fields(record: object) -> None:
     """Require that the fields of a dataclass that were given are what their annotations say."""
     hints, _ = _annotations(cast(Any, type(record)))
     defaults = vars(type(record))
@@ -175,7 +175,7 @@ def fields(record: Any) -> None:
 
 
 @functools.cache
-def _annotations(annotated: Any) -> tuple[dict[str, Any], Sequence[str]]:
+def _annotations(annotated: object) -> tuple[dict[str, Any], Sequence[str]]:
     """Return the types of the arguments of a function, and the names of those given by place; of a class those of fields."""
     code = getattr(annotated, "__code__", None)
     return typing.get_type_hints(annotated), code.co_varnames[: code.co_argcount] if code else ()
@@ -245,5 +245,5 @@ def _words(kind: Any) -> str:
     return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
-def _several(kind: Any) -> str:
+def _several(kind: object) -> str:
     return f"{_words(kind).partition(' ')[2]}s"

@@ -37,7 +37,7 @@ def shown(made: Any) -> str:
     return f"{type(made).__name__}({', '.join(fields)})"
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Return a value behind the name of its field."""
     if isinstance(value, np.ndarray):
         return f": array {value.shape}"

@@ -119,7 +119,7 @@ class Member:
     frame: Quaternion = (1.0, 0.0, 0.0, 0.0)
     strains: Vector = (0.0, 0.0, 0.0)
 
-    def drawn(self, s: Any) -> np.ndarray:
+    def drawn(self, s: float | np.ndarray) -> np.ndarray:
         """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
         own = natural_state.helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
         q = np.array(product(self.frame, tuple(own[:, :4].T))).T
@@ -159,7 +159,7 @@ def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member
     return Member(section, length, _numbers(begin), frame)
 
 
-def frame_along(tangent: Any, normal: Vector, what: str) -> Quaternion:
+def frame_along(tangent: Sequence[float], normal: Vector, what: str) -> Quaternion:
     """Return the quaternion of a frame with a tangent, a unit vector, whose normal d2 is as near as possible to a direction.
 
     Raises
@@ -175,7 +175,7 @@ def frame_along(tangent: Any, normal: Vector, what: str) -> Quaternion:
     return frame
 
 
-def _numbers(values: Any) -> Any:
+def _numbers(values: object) -> Any:
     """Return a vector as a tuple of Python's numbers."""
     return tuple(map(float, values))
 
@@ -694,7 +694,7 @@ class Network:
         except ContinError as error:  # the way has come there: what fails is the matrix
             raise ProblemError(MECHANISM) from error
 
-    def state_near(self, guess: Any, values: Mapping[str, float] | None = None, **options: Any) -> Point:
+    def state_near(self, guess: object, values: Mapping[str, float] | None = None, **options: Any) -> Point:
         """Return the state that Newton's method finds from a guess.
 
         Raises
@@ -763,7 +763,7 @@ class Network:
         branch_point = locate_branch_point(system, x)
         return replace(point_of(system, branch_point.x), label=Label.BRANCH_POINT, details=branch_point)
 
-    def _moved_by(self, point: Point, guess: Any) -> float:
+    def _moved_by(self, point: Point, guess: object) -> float:
         """Return by how much a state is away from a guess: quaternions, and places over the longest length."""
         if not isinstance(guess, list):
             return 0.0

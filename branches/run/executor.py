@@ -155,7 +155,7 @@ class _Processes:
         self._workers: list[_Worker] = []
         self._queue: collections.deque[tuple[futures.Future, tuple]] = collections.deque()
 
-    def submit(self, function: Callable[[Any], Any], job: Any) -> futures.Future:
+    def submit(self, function: Callable[[Any], Any], job: object) -> futures.Future:
         """Queue ``function(job)`` for the next free process."""
         future: futures.Future = futures.Future()
         self._queue.append((future, (function, job)))
@@ -236,7 +236,7 @@ def _start_method() -> str:
     return "fork" if sys.platform.startswith("linux") else "spawn"
 
 
-def _alone(function: Callable[[Any], Any], job: Any) -> Any:
+def _alone(function: Callable[[Any], Any], job: object) -> Any:
     """Return ``function(job)``, computed by one thread: other cores have jobs of their own."""
     os.environ["CONTIN_THREADS"] = "1"
     return function(job)

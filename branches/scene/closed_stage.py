@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -183,7 +182,7 @@ class ClosedStage(Stage):
             f"  {point['energy']:14.8f}  {step:8.1e} {point.system.intervals:3d} {point.iterations:3d}"
         )
 
-    def describe(self, event: Any, largest: float) -> str:
+    def describe(self, event: np.void, largest: float) -> str:
         scene = self.scene
         label, name = event["label"], event["name"].decode()
         place = f"kappa_n L/2pi = {event['kappa_n']:.10f}"

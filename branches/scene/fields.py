@@ -69,7 +69,7 @@ class StepConfig(Strict):
         return min(max(0.05, self.smallest), self.largest) if self.first is None else self.first
 
 
-def _two_ordered_numbers(ends: Any) -> Any:
+def _two_ordered_numbers(ends: object) -> Any:
     numbers = isinstance(ends, (list, tuple)) and all(type(end) in (int, float) and math.isfinite(end) for end in ends)
     if not (numbers and len(ends) == 2 and ends[0] < ends[1]):
         raise ValueError(f"must be two finite numbers, the smaller first, as in [-100, 100], not {show(ends)}")
@@ -79,7 +79,7 @@ def _two_ordered_numbers(ends: Any) -> Any:
 Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 
 
-def show(value: Any) -> str:
+def show(value: object) -> str:
     """Return a value for a message, at most 60 letters of it."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

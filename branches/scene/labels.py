@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+import numpy as np
 
 from contin.lowlevel import Colour
 
@@ -82,7 +83,7 @@ def label_of(text: str) -> Label:
     return LABELS.get(text, LABELS["EP"])
 
 
-def begins(event: Any) -> bool:
+def begins(event: np.void) -> bool:
     """Return whether a row of the table of labelled points is that of the first point of a run."""
     return bool(event["name"] == START.encode())
 

@@ -42,7 +42,7 @@ _PLACE = re.compile(r"(\w+) (?:(start|finish)|at (0?\.\d+))")
 _PLACES = "a strip and start, finish or a part of its length, as in 'beam start' or 'beam at 0.3'"
 
 
-def _vector(value: Any) -> tuple[float, float, float]:
+def _vector(value: object) -> tuple[float, float, float]:
     if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
         raise ValueError(f"must be three numbers, not {value!r}")
     x, y, z = value
@@ -107,7 +107,7 @@ class JointConfig(Strict):
         return self
 
 
-def _joint(value: Any) -> Any:
+def _joint(value: object) -> Any:
     return {"strips": value} if isinstance(value, list) else value
 
 
@@ -128,7 +128,7 @@ class ForceConfig(Strict):
         return self
 
 
-def _force(value: Any) -> Any:
+def _force(value: object) -> Any:
     return {"force": value} if isinstance(value, list) else value
 
 
@@ -181,7 +181,7 @@ class NetworkScene(StagedScene):
 
     @model_validator(mode="before")
     @classmethod
-    def _infinite(cls, values: Any) -> Any:
+    def _infinite(cls, values: object) -> Any:
         """Let B2 be infinite, which other numbers must not be."""
         if not isinstance(values, dict):
             return values

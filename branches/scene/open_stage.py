@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -364,7 +363,7 @@ class OpenStage(Stage):
         """Return the two columns of the table that a run shows, behind the number that is followed: the second one first."""
         return [("F_tangent", self.strip.reactions(point)["F_tangent"]), ("energy", point["energy"])]
 
-    def describe(self, event: Any, largest: float) -> str:
+    def describe(self, event: np.void, largest: float) -> str:
         name, factor = self.follow, self.scene.factor(self.follow)
         label, error = event["label"].decode(), event[f"error_{name}"] * factor
         shown = dict.fromkeys(("energy", self.felt(name)))  # and what is conjugate to the followed number
@@ -379,7 +378,7 @@ class OpenStage(Stage):
         kind = f" ({told})" if told else ""
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
 
-    def _with_error(self, event: Any, column: str) -> str:
+    def _with_error(self, event: np.void, column: str) -> str:
         """Return a column of a labelled point with its error, '' where it has none."""
         if f"error_{column}" not in event.dtype.names or math.isnan(event[f"error_{column}"]):
             return ""

@@ -45,7 +45,7 @@ _OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
 Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value))]
 
 
-def _direction(value: Any) -> tuple[float, float, float]:
+def _direction(value: object) -> tuple[float, float, float]:
     if isinstance(value, str) and value in DIRECTIONS:
         return DIRECTIONS[value]
     if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
@@ -88,14 +88,14 @@ class EndConfig(Strict):
         return End(self.rotation, self.about or DIRECTIONS["width"], director, held)
 
 
-def _belongs(field: str, rotations: str, value: Any, rotation: str) -> str:
+def _belongs(field: str, rotations: str, value: object, rotation: str) -> str:
     """Return what is wrong with a field that is missing, or that this rotation does not have."""
     if value is None:
         return f"{field}: is missing; the rotation {rotation!r} needs it"
     return f"{field}: belongs to the rotation {rotations}, not to {rotation!r}"
 
 
-def _end(value: Any) -> Any:
+def _end(value: object) -> Any:
     if isinstance(value, str) and value not in _WORDS:
         raise ValueError(f"{value!r} must be {', '.join(_WORDS)}, or fields such as rotation and slides_along")
     return _WORDS[value] if isinstance(value, str) else value
@@ -201,7 +201,7 @@ class StageConfig(_How, _Ends, _Where):
     """A stage of an open strip; from there on, the ends may be held otherwise."""
 
 
-def _expression(value: Any) -> Any:
+def _expression(value: object) -> Any:
     """Return data along the strip as an expression: a table is the polynomial through its points (Newton's form)."""
     if not isinstance(value, list):
         return value
@@ -322,7 +322,7 @@ class OpenScene(StagedScene):
 
     @model_validator(mode="before")
     @classmethod
-    def _infinite(cls, values: Any) -> Any:
+    def _infinite(cls, values: object) -> Any:
         """Let B2 be infinite, which other numbers must not be."""
         return (
             values | {"material": finite(values["material"])} if isinstance(values, dict) and "material" in values else values
@@ -455,7 +455,7 @@ class OpenScene(StagedScene):
         return f"{law}, {self.strip().start.words} and {self.strip().finish.words}"
 
 
-def finite(section: Any) -> Any:
+def finite(section: object) -> Any:
     """Return the fields of a section with an infinite B2 as text: other numbers must be finite."""
     return section | {"B2": "inf"} if isinstance(section, dict) and section.get("B2") == math.inf else section
 
@@ -472,7 +472,7 @@ def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:
     return found
 
 
-def _stage_in_si_units(stage: Any) -> Any:
+def _stage_in_si_units(stage: object) -> Any:
     """Return the fields of a stage with its numbers in SI units."""
     if not isinstance(stage, dict):
         return stage
@@ -485,14 +485,14 @@ def _stage_in_si_units(stage: Any) -> Any:
     return stage | read | to
 
 
-def _in_si_units(part: str, numbers: Any) -> Any:
+def _in_si_units(part: str, numbers: object) -> Any:
     """Return numbers by name in SI units; what is no number is left for the check of the field."""
     if not isinstance(numbers, dict):
         return numbers
     return {name: _one_in_si_units(f"{part}: {name}", name, value) for name, value in numbers.items()}
 
 
-def _one_in_si_units(what: str, name: Any, value: Any) -> Any:
+def _one_in_si_units(what: str, name: object, value: object) -> Any:
     if isinstance(value, list):
         return [_one_in_si_units(what, name, one) for one in value]
     unit = _unit_of(name)[2] if isinstance(name, str) else ""
@@ -504,7 +504,7 @@ def _one_in_si_units(what: str, name: Any, value: Any) -> Any:
         raise ValueError(f"{what}: {error}") from error
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return exact_text(value) if type(value) in (int, float) else str(value)
 
 

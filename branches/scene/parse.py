@@ -157,7 +157,7 @@ def difference(stored: Scene, scene: Scene, ignored: Sequence[str] = ()) -> str:
     return ""
 
 
-def _put(values: dict, path: list[str], value: Any) -> None:
+def _put(values: dict, path: list[str], value: object) -> None:
     for part in path[:-1]:
         values = values.setdefault(part, {})
         if not isinstance(values, dict):
@@ -171,7 +171,7 @@ def lists_in(values: dict, places: Sequence[tuple[str, ...]]) -> dict[tuple, lis
     return {place: value for place, value in found if isinstance(value, list)}
 
 
-def _at(value: Any, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
+def _at(value: object, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
     """Yield the places below a value that match a pattern, and what is there."""
     if not pattern:
         yield place, value
@@ -245,7 +245,7 @@ def _fields(location, model: type[BaseModel]) -> list[str]:
     return list(model.model_fields)
 
 
-def _is_model(kind: Any) -> bool:
+def _is_model(kind: object) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 

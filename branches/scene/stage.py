@@ -128,7 +128,7 @@ class Stage(ABC):
         """Return a line of the table that a run shows."""
 
     @abstractmethod
-    def describe(self, event: Any, largest: float) -> str:
+    def describe(self, event: np.void, largest: float) -> str:
         """Return a labelled point in words; ``largest`` is the largest value of the followed number in the stage."""
 
     def described(self, events: np.ndarray) -> list[str]:

@@ -252,7 +252,7 @@ def _inverse(pencil: Pencil, kind: type) -> Function:
 
     matrix, into, rates, _ = pencil
 
-    def inverse(shift: Any) -> Function:
+    def inverse(shift: object) -> Function:
         factors = splu(csc_array(matrix - shift * (into @ rates), dtype=kind))
         return lambda v: rates @ factors.solve(np.asarray(into @ v, dtype=kind))
 

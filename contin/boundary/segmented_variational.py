@@ -91,7 +91,7 @@ class VariationalSegment:
         """
         signatures = self.signatures(parameters)
 
-        def carried(name: str, value: Any) -> Any:
+        def carried(name: str, value: object) -> Any:
             if isinstance(value, Mapping):
                 return {each: carried(name, own) for each, own in value.items()}
             if not callable(value):

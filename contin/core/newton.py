@@ -108,7 +108,7 @@ def correct(
     system: Equations,
     guess: Sequence[float] | Array,
     row: Array | None = None,
-    target: Any = 0.0,
+    target: float | Array = 0.0,
     newton: Newton = Newton(),
     factors: Factors | None = None,
     sizes: Sizes | None = None,
@@ -162,7 +162,7 @@ def _in_one_call(
     work: Workspace,
     guess: Sequence[float] | Array,
     row: Array | None,
-    target: float,
+    target: float | Array,
     newton: Newton,
     linearize: bool = False,
     near: Factorization | None = None,
@@ -201,7 +201,12 @@ def _in_one_call(
 
 
 def _newton(
-    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes | None
+    system: Equations,
+    guess: Sequence[float] | Array,
+    row: Array | None,
+    target: float | Array,
+    newton: Newton,
+    sizes: Sizes | None,
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
@@ -235,7 +240,7 @@ def _newton(
 
 
 def _settled(
-    system: Equations, x: Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes, updates: list[float]
+    system: Equations, x: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes, updates: list[float]
 ) -> Corrected:
     """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
@@ -384,7 +389,12 @@ class _Progress:
 
 
 def _chords(
-    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, factors: Factors
+    system: Equations,
+    guess: Sequence[float] | Array,
+    row: Array | None,
+    target: float | Array,
+    newton: Newton,
+    factors: Factors,
 ) -> Corrected:
     """Chord steps with factors from elsewhere, for a guess that is close.
 

@@ -76,7 +76,7 @@ class System(Discretization):
         """Return the places of parameters among all of them."""
         return np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
 
-    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
+    def pack(self, states: object, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from states and the mapping of free parameters."""
         scaled = np.asarray(states, dtype=float).reshape(-1, self.scales.states.size) / self.scales.states
         free = np.array([float(values[name]) for name in self.free])

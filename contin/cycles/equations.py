@@ -376,7 +376,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     """
 
     def __init__(
-        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        self, problem: object, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
@@ -501,7 +501,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
-    def _with(self, **changes: Any) -> CycleEquations:
+    def _with(self, **changes: object) -> CycleEquations:
         other: Any = super()._with(**changes)
         other._set_reference(self.reference)
         found: CycleEquations = other

@@ -276,7 +276,7 @@ def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newto
     return len(values) == 2 and sign_changed(*values)
 
 
-def critical_angle(system: PeriodicEquations | MapEquations, point: Any, x: Array) -> float:
+def critical_angle(system: PeriodicEquations | MapEquations, point: object, x: Array) -> float:
     """Return the angle of the pair on the circle at a torus bifurcation x: that of the point or, if unknown, of the nearest."""
     known = frequency_of(point)
     if known is not None:

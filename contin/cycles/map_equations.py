@@ -86,7 +86,7 @@ class MapEquations(AlgebraicEquations):
         """Return the points of the cycle, shape (rounds, n)."""
         return x[: self.state_size].reshape(self.rounds, self._n)
 
-    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
+    def pack(self, states: object, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from all points of a cycle, or from one of them, to which the map is applied."""
         states = np.asarray(states, dtype=float).reshape(-1, self._n)
         if len(states) == self.rounds:

@@ -129,7 +129,7 @@ class CycleForm(Form):
         right[: values.size] = (self._widths * values).ravel()
         return self._direction(self.solver(self.coupling(rate)).solve(right))
 
-    def along(self, *directions: Any) -> Any:
+    def along(self, *directions: object) -> Any:
         """Return B or C along directions at the Gauss points, real or complex."""
         along = self.system.rates_along
         return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)

@@ -123,8 +123,8 @@ class CycleProblem(BoundaryValueProblem):
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
-        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
-        angles: Angles = (), mass: Any = None,
+        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: object = None,
+        angles: Angles = (), mass: object = None,
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", {} if functionals is None else functionals, "functions"))
         names = check_statement(states, parameters, means)
@@ -398,7 +398,7 @@ class FollowedProblem(CycleProblem):
         self._keep(following=tuple(following), functionals={name: functions[name] for name in columns})
 
 
-def _with_mass(field: Function, mass: Any, names: Sequence[str], forced: bool) -> tuple[Function, Mass | None]:
+def _with_mass(field: Function, mass: object, names: Sequence[str], forced: bool) -> tuple[Function, Mass | None]:
     """Return the field times the inverse of a regular mass matrix, and a singular one."""
     if mass is None:
         return field, None
@@ -406,7 +406,7 @@ def _with_mass(field: Function, mass: Any, names: Sequence[str], forced: bool) -
     return (found.rates_of(field, 2 + forced), None) if found.is_regular else (field, found)
 
 
-def _turn(symmetry: Any, forced: bool, count: int) -> Array:
+def _turn(symmetry: object, forced: bool, count: int) -> Array:
     """Return the matrix of a symmetry, the identity where there is none.
 
     Raises

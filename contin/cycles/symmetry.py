@@ -22,7 +22,7 @@ _EQUAL = 1e-9
 _PLACES, _SEED = 5, 7
 
 
-def symmetry_matrix(symmetry: Any, count: int) -> Array:
+def symmetry_matrix(symmetry: object, count: int) -> Array:
     """Return the matrix of a symmetry that is given as a matrix or as its diagonal.
 
     Raises

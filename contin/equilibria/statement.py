@@ -309,7 +309,7 @@ class ReducedProblem(AlgebraicProblem):
     following: tuple[str, ...]
     _follow: Array
 
-    def __init__(self, whole: AlgebraicProblem, totals: Any) -> None:
+    def __init__(self, whole: AlgebraicProblem, totals: object) -> None:
         names, totals = whole.state_names, np.asarray(totals, dtype=float)
         own = (totals != 0) & (np.count_nonzero(totals, axis=0) == 1) & (totals == 1)
         pivots = [int(row.argmax()) for row in own]

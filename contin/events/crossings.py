@@ -124,7 +124,7 @@ def _along(factors: Callable[[float], Factors], start: float, end: float, halvin
     yield from _along(factors, middle, end, halvings - 1)
 
 
-def _is_condensed(factors: Any) -> bool:
+def _is_condensed(factors: object) -> bool:
     """Return whether a matrix has been condensed."""
     return isinstance(factors, Factorization) and factors.ends is not None
 

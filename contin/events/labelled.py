@@ -78,7 +78,7 @@ class Finding:
 _NOTHING = Finding()
 
 
-def finding_of(details: Any) -> Finding:
+def finding_of(details: object) -> Finding:
     """Return what a location has found, of the details of a point; these may be numbers, or whatever a user's function says."""
     return details if isinstance(details, Finding) else _NOTHING
 

@@ -104,7 +104,7 @@ class Form(ABC):
         """Return the h with L h = values, which are given where the forms are evaluated."""
 
     @abstractmethod
-    def along(self, *directions: Any) -> Any:
+    def along(self, *directions: object) -> Any:
         """Return B or C along real or complex directions."""
 
     @abstractmethod
@@ -168,7 +168,7 @@ class DenseForm(Form):
         coupling, right = self.coupling(rate), cast(Array, -values)
         return Direction(self.solver(np.asarray(coupling, np.result_type(coupling, values))).solve(right))
 
-    def along(self, *directions: Any) -> Any:
+    def along(self, *directions: object) -> Any:
         """Return B or C along real or complex directions."""
         return of_complex(self._along, directions)
 

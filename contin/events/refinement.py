@@ -181,7 +181,7 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Tr
     return trial, details, moves
 
 
-def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
+def _again(point: SpecialPoint, trial: Trial, details: object, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
     """Return the special point and its details on another mesh.
 
     Raises

@@ -205,7 +205,7 @@ def _ready(function: Callable[..., Any]) -> Any:
     return copy
 
 
-def _known(value: Any, names: frozenset[str]) -> Any:
+def _known(value: object, names: frozenset[str]) -> Any:
     """Return what numba knows a global value as, or for a module its members of these ``names``; others stay as they are."""
     if isinstance(value, python_types.ModuleType):
         members = {name: vars(value)[name] for name in names & vars(value).keys()}
@@ -322,7 +322,7 @@ def _intrinsic(instruction: Instruction) -> Any:
             value = context.make_tuple(builder, result, value)
         builder.ret_void() if nothing else builder.ret(value)
 
-    def typed(context: Any, *given: types.Type) -> Any:
+    def typed(context: object, *given: types.Type) -> Any:
         return result(*(kind if hint is Any else _type(hint) for hint, kind in zip(parameters, given))), call
 
     return numba.extending.intrinsic(functools.wraps(write)(typed))

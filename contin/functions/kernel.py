@@ -146,7 +146,7 @@ class Kernel:
                 machine_code.keep(self.key, found)
             return found
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """Run the machine code."""
         return self.compiled(*arguments)
 
@@ -240,7 +240,7 @@ def contents(*files: Path) -> str:
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def _fingerprint(*parts: Any) -> str:
+def _fingerprint(*parts: object) -> str:
     """Return a fingerprint of what has a fixed representation."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 

@@ -46,7 +46,7 @@ class Helper:
         functools.update_wrapper(self, function)
         self.function, self.inline = function, inline
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """Run the Python function."""
         return self.function(*arguments)
 
@@ -94,7 +94,7 @@ def _names(function: Any) -> set[str]:
     return {*names_in(function.__code__), *_hints(function)}
 
 
-def _hints(item: Any) -> list[str]:
+def _hints(item: object) -> list[str]:
     """Return the annotations of a function or a named tuple, as they are written."""
     return [str(getattr(hint, "__forward_arg__", hint)) for hint in getattr(item, "__annotations__", {}).values()]
 
@@ -121,7 +121,7 @@ class Instruction:
         functools.update_wrapper(self, write)
         self.function = write
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """Raise TypeError: there is no Python function."""
         raise TypeError(f"{self.function.__name__} is an instruction, only kernels can call it")
 

@@ -35,7 +35,7 @@ class Recorder(Protocol):
     def value(self, place: int) -> float | None: ...
     def constant(self, value: float) -> int: ...
     def at(self, name: str, places: Places, data: object = None) -> int: ...
-    def apply(self, name: str, *operands: Any, data: object = None) -> Any: ...
+    def apply(self, name: str, *operands: object, data: object = None) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -150,12 +150,12 @@ def _simple_select(tape: Recorder, places: Places) -> int | None:
 # --- derivatives --------------------------------------------------------------------------------------------------------------
 
 
-def _of_pow(tape: Recorder, data: None, operands: Operands, result: Any) -> tuple[Any, Any]:
+def _of_pow(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any]:
     x, y = operands
     return y * x ** (y - 1.0), tape.apply("product", result, tape.apply("log", x))
 
 
-def _of_select(tape: Recorder, data: None, operands: Operands, result: Any) -> tuple[Any, Any, Any]:
+def _of_select(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any, Any]:
     condition = operands[0]
     return None, tape.apply("select", condition, 1.0, 0.0), tape.apply("select", condition, 0.0, 1.0)
 
@@ -165,7 +165,7 @@ def _one(function: Callable[..., Any]) -> Callable[..., Any]:
     return lambda tape, data, operands, result: (function(tape, operands[0], result),)
 
 
-def _none(tape: Recorder, data: object, operands: Operands, result: Any) -> tuple[None, ...]:
+def _none(tape: Recorder, data: object, operands: Operands, result: object) -> tuple[None, ...]:
     return (None,) * len(operands)
 
 
@@ -217,7 +217,7 @@ def _linear(data: tuple[float, ...], *operands: float) -> float:
     return _dot(None, *data, *operands)
 
 
-def _of_dot(tape: Recorder, data: None, operands: Operands, result: Any) -> Operands:
+def _of_dot(tape: Recorder, data: None, operands: Operands, result: object) -> Operands:
     half = len(operands) // 2
     return (*operands[half:], *operands[:half])
 
@@ -228,7 +228,7 @@ def _operation(function: Callable[..., Any], partials: Callable[..., Any], exter
     return Primitive(evaluate, partials, external, constant=evaluate, **more)
 
 
-def _ufunc(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: Any) -> Primitive:
+def _ufunc(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: object) -> Primitive:
     """Return the operation of a universal function of NumPy, or of one of SciPy's by `_special`."""
     return _operation(function, partials, external, ufunc=function.__name__, **more)
 
@@ -258,7 +258,7 @@ def _root_of_pair(apply: Callable[..., Any], x: Any, y: Any) -> tuple[Any, Any]:
     return apply("select", left, abs(other), part), apply("select", left, sign * part, other)
 
 
-def _tan_of_pair(apply: Callable[..., Any], x: Any, y: Any) -> tuple[Any, Any]:
+def _tan_of_pair(apply: Callable[..., Any], x: object, y: object) -> tuple[Any, Any]:
     """Return the tangent, and with exchanged parts the hyperbolic one; nothing cancels near a pole."""
     sin, cos, sinh, cosh = apply("sin", x), apply("cos", x), apply("sinh", y), apply("cosh", y)
     square = cos * cos + sinh * sinh

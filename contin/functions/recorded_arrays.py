@@ -33,7 +33,7 @@ _RECORDED = (Number, ComplexNumber)
 class Numbers(np.ndarray):
     """An array of recorded and ordinary numbers."""
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: object) -> Any:
         return ufunc_of_numbers(ufunc, method, inputs, options)
 
     def __array_function__(
@@ -113,7 +113,7 @@ def _with_class(value: Any) -> Any:
 def operation(name: str) -> Callable[..., Any]:
     """Return the function of numbers that records an operation, and computes it for ordinary numbers."""
 
-    def apply(*values: Any) -> Any:
+    def apply(*values: object) -> Any:
         if any(map(is_complex, values)):
             return function_of_complex(name, *values[:1])
         tape = _tape(values)
@@ -127,7 +127,7 @@ def _tape(values: Sequence[object]) -> Tape | None:
     return None if found is None else found.tape
 
 
-def select(condition: Scalar, a: Any, b: Any) -> Any:
+def select(condition: Scalar, a: object, b: object) -> Any:
     """Return a where a condition holds, else b."""
     tape = _tape((condition, a, b))
     if tape is None or not isinstance(condition, Number):
@@ -217,7 +217,7 @@ def ufunc_of_numbers(ufunc: np.ufunc, method: str, inputs: Sequence[object], opt
     raise Unrecordable(f"it calls {name}.{method}")
 
 
-def _stored(result: Any, out: tuple[NDArray[Any], ...] | None = None, **_: object) -> Any:
+def _stored(result: object, out: tuple[NDArray[Any], ...] | None = None, **_: object) -> Any:
     """Return the result, in the array ``out`` where one is given."""
     if not out:
         return result
@@ -405,7 +405,9 @@ def _solved(a: object, b: object) -> Any:
     return matrix_product(_inverse(a), b)
 
 
-def _interp(x: object, xp: Any, fp: Any, left: float | None = None, right: float | None = None, period: None = None) -> Any:
+def _interp(
+    x: object, xp: object, fp: object, left: float | None = None, right: float | None = None, period: None = None
+) -> Any:
     if period is not None or recorded(xp, fp) is not None:
         raise Unrecordable("np.interp has a period, or knots that are no constants")
     return tabulated(Table.linear(xp, fp, left, right))(x)

@@ -101,7 +101,7 @@ class RecordedFunction:
         return hash((self._names, self._arguments, self._single))
 
 
-def _flat(argument: Any) -> list[Any]:
+def _flat(argument: object) -> list[Any]:
     """Return the numbers of an argument: of a number, a tuple, or a tuple of tuples."""
     if isinstance(argument, tuple):
         return [number for part in argument for number in _flat(part)]

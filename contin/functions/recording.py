@@ -92,7 +92,7 @@ def record(functions: Sequence[UserFunction], signature: Signature) -> Recording
     return Recording(tape, tuple(results), time.place, tuple(each.place for each in inputs))
 
 
-def _given(signature: Signature, time: Any, inputs: Sequence[Any]) -> list[Any]:
+def _given(signature: Signature, time: object, inputs: Sequence[Any]) -> list[Any]:
     """Return what functions of a signature are called with."""
     return [time, *inputs] if signature.times else list(inputs)
 
@@ -173,7 +173,7 @@ def _joined(tape: Tape, condition: int, values: list[int], others: list[int]) ->
     return [tape.at("select", (condition, a, b)) for a, b in zip(values or none, others or none)]
 
 
-def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: Any) -> list[int]:
+def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: object) -> list[int]:
     """Return the places of a function's values on one path; none where Python raises an error of arithmetic."""
     try:
         return [tape.number(_real(value)).place for value in call(copy)]
@@ -187,7 +187,7 @@ def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: Any) -> list
         raise Unrecordable(_sentence(error)) from error
 
 
-def _real(value: Any) -> Any:
+def _real(value: object) -> Any:
     """Return a value that a function returns; of a complex number without an imaginary part, the real one."""
     if not isinstance(value, ComplexNumber):
         return value

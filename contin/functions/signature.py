@@ -99,7 +99,7 @@ class UserFunction:
         return list(found) if self.count or self.fills else [found]
 
 
-def flat(result: Any) -> Any:
+def flat(result: object) -> Any:
     """Return what a function returns, an array as a list or a number."""
     if isinstance(result, np.ndarray):
         return result.ravel().tolist() if result.ndim else result.item()

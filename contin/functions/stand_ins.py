@@ -38,7 +38,7 @@ from contin.functions.tables import Table
 from contin.functions.tape import Number, Unrecordable
 
 
-def prepared(function: Any) -> Any:
+def prepared(function: object) -> Any:
     """Return a copy of a function that takes recorded numbers.
 
     Raises
@@ -56,7 +56,7 @@ class _Copies:
         self._done: dict[int, Any] = {}
         self._kept: list[Any] = []  # what is known by its address stays alive
 
-    def function(self, function: Any) -> Any:
+    def function(self, function: object) -> Any:
         """Return the copy of a function, method, partial function, or object that can be called."""
         function = getattr(function, "py_func", function)
         if isinstance(function, RecordedFunction):
@@ -101,7 +101,7 @@ class _Copies:
                 continue
         return copy
 
-    def value(self, value: Any) -> Any:
+    def value(self, value: object) -> Any:
         """Return what stands for a value."""
         if isinstance(value, (Number, ComplexNumber, Numbers, RecordedFunction, _Module, _Object)):
             return value
@@ -124,7 +124,7 @@ class _Copies:
             return {name: self.value(part) for name, part in value.items()}
         return self._object(value) if _is_object(value) else value
 
-    def _object(self, value: Any) -> Any:
+    def _object(self, value: object) -> Any:
         if id(value) not in self._done:
             self._kept.append(value)
             self._done[id(value)] = _Object(value, self)
@@ -195,11 +195,11 @@ def _globals_in(code: types.CodeType) -> set[str]:
     return own.union(*map(_globals_in, inner))
 
 
-def _may_hold_functions(value: Any) -> bool:
+def _may_hold_functions(value: object) -> bool:
     return callable(value) or isinstance(value, (list, tuple, dict)) or _is_object(value) or hasattr(value, "tocsr")
 
 
-def _is_object(value: Any) -> bool:
+def _is_object(value: object) -> bool:
     """Return whether a value is an object of a user's class."""
     module = type(value).__module__
     if module.partition(".")[0] in ("numpy", "scipy") or module.startswith(_HERE):
@@ -213,7 +213,7 @@ def _is_object(value: Any) -> bool:
 _HEAP_TYPE = 1 << 9
 
 
-def _own(value: Any) -> Any:
+def _own(value: object) -> Any:
     """Return the stand-in of a function, sparse matrix or spline; None of everything else."""
     if isinstance(value, np.ufunc):
         function = UFUNCS.get(value.__name__)
@@ -327,11 +327,11 @@ def _distance(p: Sequence[Any], q: Sequence[Any]) -> Any:
     return operation("sqrt")(scalar_product(difference, difference))
 
 
-def _log(x: Any, base: Any = math.e) -> Any:
+def _log(x: object, base: object = math.e) -> Any:
     return operation("log")(x) if base == math.e else operation("log")(x) / operation("log")(base)
 
 
-def _hypot(*values: Any) -> Any:
+def _hypot(*values: object) -> Any:
     return operation("hypot")(*values) if len(values) == 2 else operation("sqrt")(scalar_product(values, values))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ class Table:
     coefficients: tuple[tuple[float, ...], ...]
 
     @classmethod
-    def linear(cls, x: Any, y: Any, left: float | None = None, right: float | None = None) -> Table:
+    def linear(cls, x: object, y: object, left: float | None = None, right: float | None = None) -> Table:
         """Return the interpolation of `numpy.interp`: constant outside."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         slopes = np.diff(y) / np.diff(x)
@@ -38,7 +37,7 @@ class Table:
         return cls(tuple(x.tolist()), (x[0].item(), *x.tolist()), tuple((float(a), float(b)) for a, b in rows))
 
     @classmethod
-    def piecewise(cls, knots: Any, coefficients: Any) -> Table:
+    def piecewise(cls, knots: object, coefficients: object) -> Table:
         """Return a polynomial of SciPy's kind (``PPoly``): coefficients (order, pieces), the first and last piece continued."""
         knots = np.asarray(knots, dtype=float)
         rows = np.asarray(coefficients, dtype=float).T

@@ -39,7 +39,7 @@ class Options:
     degree: int
 
 
-def restated(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+def restated(problem: object, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
     """Return a problem without states that follow from others, the guess for it, and the parameters.
 
     These are states without rates, and those that follow from conserved totals.

@@ -88,7 +88,7 @@ def batch(
     return [*first, *_in_processes(function, problem, jobs[1:], workers)]
 
 
-def _rows(function: Callable[..., Any], problem: Any, job: Sequence[Mapping[str, float]]) -> list[Row]:
+def _rows(function: Callable[..., Any], problem: object, job: Sequence[Mapping[str, float]]) -> list[Row]:
     """Return the rows of some sets of values."""
     rows = []
     for values in job:
@@ -106,7 +106,7 @@ def _said(error: BaseException) -> str:
 # --- processes --------------------------------------------------------------------------------------------------------
 
 
-def _in_processes(function: Callable[..., Any], problem: Any, jobs: Sequence[Any], workers: int) -> list[Row]:
+def _in_processes(function: Callable[..., Any], problem: object, jobs: Sequence[Any], workers: int) -> list[Row]:
     """Return the rows of jobs, computed by processes of this machine."""
     from concurrent.futures import ProcessPoolExecutor  # 20 ms; only this needs it
 
@@ -125,7 +125,7 @@ def _in_processes(function: Callable[..., Any], problem: Any, jobs: Sequence[Any
 _WORK: list[Any] = []
 
 
-def _begin(function: Callable[..., Any], problem: Any) -> None:
+def _begin(function: Callable[..., Any], problem: object) -> None:
     """Take the function and the problem; one thread computes, since other cores have jobs of their own."""
     os.environ["CONTIN_THREADS"] = "1"
     _WORK[:] = function, problem
