@@ -17,7 +17,8 @@ from ribbon_model import ends
 from ribbon_model.changed_ends import balanced, held_angles
 from ribbon_model.ends import ANGLES, FREE, FREE_END, HINGED, End
 from ribbon_model.loads import FORCES, replacing_loads
-from ribbon_model.network import MOVES, Load, Network
+from ribbon_model.members import Load
+from ribbon_model.network import MOVES, Network
 
 #: Behind the name of a joint: its dead forces along the axes of the drawing, and its dead moment.
 _NAMES = dict(zip((*FORCES, "moment"), ("force_x", "force_y", "force_z", "moment")))

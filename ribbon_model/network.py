@@ -40,17 +40,28 @@ from contin import (
     trace,
 )
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
-from ribbon_model import ends, law_end, loads, natural_state
+from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
+from ribbon_model.members import (
+    BALL,
+    FINISH,
+    HINGE,
+    RIGID,
+    START,
+    Joint,
+    JointEnd,
+    Load,
+    Member,
+    Quaternion,
+    numbers_of,
+    straight,
+)
 from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section
-from ribbon_model.shape import Shape, quaternions, shape_of
+from ribbon_model.shape import Shape, shape_of
 
-#: Kinds of joints.
-RIGID, HINGE, BALL = "rigid", "hinge", "ball"
-#: Ends of a member.
-START, FINISH = "start", "finish"
+__all__ = ["BALL", "FINISH", "HINGE", "RIGID", "START", "Joint", "JointEnd", "Load", "Member", "Network", "straight"]
 #: The number that leads from the drawing, which is free of stress at 0, to the network at 1: natural strains, loads, and gaps
 #: and turns of joints are this part of theirs.
 ASSEMBLY = "assembly"
@@ -60,10 +71,6 @@ MOVES = ("dx", "dy", "dz")
 POTENTIALS = ("weight", "pressure", "field")
 #: The same of a load without an energy: a pressure that stays normal to strips.
 FOLLOWER = "follower_pressure"
-#: A quaternion, scalar first.
-Quaternion = tuple[float, float, float, float]
-
-
 #: Why a state is not determined.
 MECHANISM = (
     "joints: the network can move, or a strip can turn about itself, without a change of energy, so nothing determines its "
@@ -86,174 +93,6 @@ class OutOfReach(ProblemError):
     """A drawing from which no state was found, though one may be there; ``nearest`` is how near it was brought to one."""
 
     nearest: Point
-
-
-@dataclass(frozen=True)
-class Member:
-    """A strip of a network, as it is drawn.
-
-    Attributes
-    ----------
-    section : str
-        The name of its section.
-    length : float
-    place : tuple of float
-        Where it begins.
-    frame : tuple of float
-        The quaternion of its frame there.
-    strains : tuple of float
-        Curvature about the width, about the normal, and twist of the drawing; the state begins so.
-
-    Examples
-    --------
-    A quarter of a circle of radius 1 that begins upwards:
-
-    >>> quarter = Member("strip", math.pi / 2, strains=(1.0, 0.0, 0.0))
-    >>> quarter.drawn([0.0, math.pi / 2])[-1, 4:].round(12).tolist()
-    [0.0, -1.0, 1.0]
-    """
-
-    section: str = "strip"
-    length: float = 1.0
-    place: Vector = (0.0, 0.0, 0.0)
-    frame: Quaternion = (1.0, 0.0, 0.0, 0.0)
-    strains: Vector = (0.0, 0.0, 0.0)
-
-    def drawn(self, s: float | np.ndarray) -> np.ndarray:
-        """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
-        own = natural_state.helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
-        q = np.array(product(self.frame, tuple(own[:, :4].T))).T
-        axes = np.array(directors(*self.frame)).reshape(3, 3)
-        return np.hstack([q, np.array(self.place) + own[:, 4:] @ axes])
-
-    def followed_by(self, section: str, length: float, strains: Vector = (0.0, 0.0, 0.0)) -> Member:
-        """Return a member that goes on where this one ends."""
-        state = self.drawn([self.length])[0]
-        return Member(section, length, _numbers(state[4:]), _numbers(state[:4]), strains)
-
-    def cut(self, fractions: Sequence[float]) -> list[Member]:
-        """Return the pieces of a member that is cut at fractions of its length, which increase between 0 and 1."""
-        places = [0.0, *fractions, 1.0]
-        if sorted(set(places)) != places:
-            raise ValueError(f"cut: {list(fractions)} must increase between 0 and 1")
-        begins = self.drawn([part * self.length for part in places[:-1]])
-        return [
-            Member(self.section, (end - begin) * self.length, _numbers(state[4:]), _numbers(state[:4]), self.strains)
-            for begin, end, state in zip(places, places[1:], begins)
-        ]
-
-
-def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member:
-    """Return a straight member between two places, whose normal d2 is as near as possible to a direction.
-
-    Raises
-    ------
-    ValueError
-        The places are one, or the normal lies along the member.
-    """
-    along = np.array(end, dtype=float) - begin
-    length = float(np.linalg.norm(along))
-    if not 0 < length < math.inf:
-        raise ValueError(f"a member from {list(begin)} to {list(end)} has no direction")
-    frame = frame_along(along / length, normal, f"the member from {list(begin)} to {list(end)}")
-    return Member(section, length, _numbers(begin), frame)
-
-
-def frame_along(tangent: Sequence[float], normal: Vector, what: str) -> Quaternion:
-    """Return the quaternion of a frame with a tangent, a unit vector, whose normal d2 is as near as possible to a direction.
-
-    Raises
-    ------
-    ValueError
-        The normal lies along the tangent of ``what``.
-    """
-    across = np.array(ends.unit("normal", normal)) @ (np.eye(3) - np.outer(tangent, tangent))
-    if np.linalg.norm(across) < LOOSE:
-        raise ValueError(f"normal: {list(normal)} lies along {what}")
-    across /= np.linalg.norm(across)
-    frame: Quaternion = _numbers(quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0])
-    return frame
-
-
-def _numbers(values: object) -> Any:
-    """Return a vector as a tuple of Python's numbers."""
-    return tuple(map(float, values))
-
-
-@dataclass  # the axis is normalised when it is made, and then left as it is
-class JointEnd:
-    """An end of a member at a joint.
-
-    Attributes
-    ----------
-    member : str
-    end : str
-        'start' or 'finish'.
-    angle : float or str
-        By which the member is turned at this joint, against the drawing; or the name of a number.
-    axis : tuple of float
-        About which, on the axes of the drawing.
-    arm : tuple of float
-        From the end to the joint, on the directors of the end.
-    goes_on : bool
-        The strip goes on from the end before it: both are rigidly joined, of whatever kind the joint is.
-    """
-
-    member: str
-    end: str = START
-    angle: float | str = 0.0
-    axis: Vector = (1.0, 0.0, 0.0)
-    arm: Vector = (0.0, 0.0, 0.0)
-    goes_on: bool = False
-
-    def __post_init__(self) -> None:
-        if self.end not in (START, FINISH):
-            raise ValueError(f"joint: end: {self.end!r} must be start or finish")
-        self.axis = ends.unit("axis", self.axis)
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint of any number of ends.
-
-    Attributes
-    ----------
-    members : sequence of JointEnd
-    kind : str
-        'rigid', 'hinge' or 'ball'.
-    axis : tuple of float
-        Of a hinge, on the axes of the drawing; it turns with the first member.
-    """
-
-    members: Sequence[JointEnd]
-    kind: str = RIGID
-    axis: Vector = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if self.kind not in (RIGID, HINGE, BALL):
-            raise ValueError(f"joint: kind: {self.kind!r} must be rigid, hinge or ball")
-        if not self.members:
-            raise ValueError("joint: members: there must be one at least")
-
-
-@dataclass(frozen=True)
-class Load:
-    """Forces and moments with one number.
-
-    Attributes
-    ----------
-    forces : sequence of (joint, direction, arm)
-        The force at a joint is the number times the direction. ``arm`` is on the axes of the drawing, and fixed on the first
-        member of the joint.
-    moments : sequence of (joint, factor)
-        The moment about the axis of a hinge that holds a joint is the number times the factor.
-    followers : sequence of (joint, direction, arm)
-        Forces that turn with the first member of the joint. They have no energy, so states under them have no index.
-    """
-
-    forces: Sequence[tuple[str, Vector, Vector]] = ()
-    moments: Sequence[tuple[str, float]] = ()
-    followers: Sequence[tuple[str, Vector, Vector]] = ()
 
 
 @dataclass
@@ -535,7 +374,7 @@ class Network:
         order = list(self.members)
         known = []
         for each in joint.members:
-            known.append((order.index(each.member), each, _numbers(self.drawn(each)[:4])))
+            known.append((order.index(each.member), each, numbers_of(self.drawn(each)[:4])))
 
         def read(a, b, p):
             found = []
@@ -563,7 +402,7 @@ class Network:
     def _floating(self) -> Callable:
         """Return the conditions that hold the rigid motions of a network that floats, at the first end of the first member."""
         member = next(iter(self.members.values()))
-        drawn, axes = _numbers(member.drawn([0.0])[0]), self._free_turns
+        drawn, axes = numbers_of(member.drawn([0.0])[0]), self._free_turns
 
         def conditions(a):
             turned = _from_drawing(a[0][:4], drawn[:4])[1:]
@@ -594,7 +433,7 @@ class Network:
         for number, load in self.loads.items():
             for name, direction, arm in load.forces:
                 first = self.joints[name].members[0]
-                on_directors = _numbers(np.array(first.arm) + self.drawn_axes(first) @ np.array(arm, dtype=float))
+                on_directors = numbers_of(np.array(first.arm) + self.drawn_axes(first) @ np.array(arm, dtype=float))
                 forces.append(
                     (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
                 )
@@ -629,7 +468,7 @@ class Network:
         found = []
         for number, name, direction, arm in loaded:
             first = self.joints[name].members[0]
-            own = tuple(_numbers(self.drawn_axes(first) @ v) for v in (direction, arm))
+            own = tuple(numbers_of(self.drawn_axes(first) @ v) for v in (direction, arm))
             place, end = list(self.members).index(first.member), 0 if first.end == START else 1
             found.append((number, place, end, own[0], tuple(x + y for x, y in zip(first.arm, own[1]))))
 
@@ -921,7 +760,7 @@ class Network:
     def frame(self, point: Point, joint: str) -> tuple:
         """Return the quaternion of the joint frame, the identity in the drawing."""
         first = self.joints[joint].members[0]
-        q, drawn = (_numbers(state[:4]) for state in (self._state(point, first), self.drawn(first)))
+        q, drawn = (numbers_of(state[:4]) for state in (self._state(point, first), self.drawn(first)))
         return _joint_frame(q, drawn, first, SimpleNamespace(**point.parameters))
 
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:

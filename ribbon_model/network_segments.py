@@ -23,7 +23,8 @@ from scipy.spatial.transform import Rotation
 from contin.lowlevel import Collocation, shown
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMPED, FREE, HINGED, JOINT
-from ribbon_model.network import BALL, HINGE, MOVES, POTENTIALS, RIGID, START, JointEnd, Network
+from ribbon_model.members import BALL, HINGE, RIGID, START, JointEnd
+from ribbon_model.network import MOVES, POTENTIALS, Network
 from ribbon_model.second_variation import cross_matrix
 from ribbon_model.segments import Chain, moved
 from ribbon_model.shape import frames

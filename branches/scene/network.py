@@ -18,22 +18,8 @@ from branches.scene.fields import StepConfig, Strict
 from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
 from ribbon_model.changed_supports import replacing
 from ribbon_model.ends import DIRECTIONS, FREE_END, End
-from ribbon_model.network import (
-    BALL,
-    FINISH,
-    FOLLOWER,
-    HINGE,
-    POTENTIALS,
-    RIGID,
-    START,
-    Joint,
-    JointEnd,
-    Load,
-    Member,
-    Network,
-    frame_along,
-    straight,
-)
+from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, frame_along, straight
+from ribbon_model.network import FOLLOWER, POTENTIALS, Network
 from ribbon_model.section import Section, section_of
 
 #: An end of a strip, or a place along it, in words.

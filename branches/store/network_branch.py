@@ -13,7 +13,8 @@ from branches.draw.strip import View
 from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure
 from branches.store.open_branch import OpenBranch
 from ribbon_model.ends import CLAMPED, HINGED, unit
-from ribbon_model.network import HINGE, RIGID, START, Joint, JointEnd, Network
+from ribbon_model.members import HINGE, RIGID, START, Joint, JointEnd
+from ribbon_model.network import Network
 
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
 _VIEW = View(-70.0, 20.0)
