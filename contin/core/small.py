@@ -179,7 +179,7 @@ def linearize(equations: Equations, linear: Linear, x: Array) -> float:
 
 
 @helper
-def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float | Array) -> int:
+def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float) -> int:
     """Solve F(x) = 0 and row.x = target by Newton's method and chord steps, in place."""
     size, fresh, moved, before, now = x.size, True, 1.0, math.inf, math.inf
     for number in range(1, most + 1):
@@ -227,7 +227,7 @@ def _fill_tangent(equations: Equations, linear: Linear, tangent: Array) -> None:
 
 @kernel(reorder=False, last=True)
 def correct_point(
-    equations: Equations, linear: Linear, tolerance: float, most: int, x: Vector, target: float | Array, tangent: Vector
+    equations: Equations, linear: Linear, tolerance: float, most: int, x: Vector, target: float, tangent: Vector
 ) -> int:
     """Correct x, in place, so that F(x) = 0 and row.x = target; fill in the tangent right there. ``linear.row`` is given."""
     outcome = _correct(equations, linear, tolerance, most, x, target)
