@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from branches.export import LIBRARIES
 from branches.store.command import Parser, Quantity, complain, survive_any_encoding, view_fault, write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid command lines are answered at once
@@ -22,7 +23,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid comman
 
 EXIT_BAD_INPUT = 2
 #: Allowed endings of --out and --movie.
-SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
+SURFACES, MOVIES = tuple(LIBRARIES), (".gif", ".mp4")
 #: Least and largest number of frames: fewer than 2 show no motion; more than 2000 take minutes and hundreds of megabytes.
 _FRAMES = (2, 2000)
 #: Least number of cells along an open strip. Flat cells lose (angle of a cell)**2/12 of the volume: 1e-6 of a strip that

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from branches.draw.solid import Mesh
+from branches.export import LIBRARIES
 from branches.store.files import StoreError
 
-#: The library that writes each format, by the ending of the file's name.
-LIBRARIES = {".stl": "trimesh", ".obj": "trimesh", ".glb": "trimesh", ".gltf": "trimesh", ".vtk": "meshio", ".vtu": "meshio"}
 #: Colour of the strip in formats with colours: the orange of the pictures (`branches.draw.strip.FRONT`), from 0 to 255.
 _COLOUR = (232, 163, 61, 255)
 
@@ -44,7 +43,7 @@ def encode(mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
     mesh : Mesh
         Its third axis is up.
     ending : str
-        One of `LIBRARIES`.
+        One of `branches.export.LIBRARIES`.
     fields : mapping of str to ndarray, shape (K, ...)
         Values at the nodes of the centreline; VTK files hold them.
 
