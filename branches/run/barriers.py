@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
     Chain = OpenChain | NetworkChain
 
-#: Two states whose places differ by less than this are one: they were corrected from two sides, on two meshes.
+#: Two states whose places differ by less than this are one: they were corrected from two sides, on two meshes. So are two
+#: values of a number, relative to 1 + its size, at which runs end.
 _SAME = 1e-6
 #: Energies of two strips of segments at rest that differ by less, relative to 1 + their size, are those of images.
 _EQUAL = 1e-6
@@ -107,7 +108,8 @@ def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[
         if value is not None and name != here:
             continue
         x, at = branch.points[name][piece.rows], float(branch.points[name][row]) if value is None else value
-        for i in np.flatnonzero((x[:-1] - at) * (x[1:] - at) <= 0):
+        gaps = np.where(np.abs(x - at) <= _SAME * (1 + abs(at)), 0.0, x - at)  # two ends that are located there may be there
+        for i in np.flatnonzero(gaps[:-1] * gaps[1:] <= 0):
             pair = piece.rows[i], piece.rows[i + 1]
             part = 0.0 if x[i] == x[i + 1] else float((at - x[i]) / (x[i + 1] - x[i]))
             state = _between(branch, pair, part, row, {} if value is None else {here: value})

@@ -333,7 +333,8 @@ def test_the_barrier_of_a_buckled_column(run):
     branch = run(COLUMN)
     stable, saddle = branch.events[branch.events["label"] == b"UZ"]
     assert (stable["index"], saddle["index"]) == (0, 1)
-    (place,) = places(branch)
+    place, at_the_end = places(branch)
+    assert [round(one.value, 9) for one in (place, at_the_end)] == [85.0, 86.0]
     ((name, way),) = place.ways.items()
     assert name == f"point {stable['point']}"
     assert way.behind == f"an image of {name}"
