@@ -198,7 +198,7 @@ def _refusal(what: str, value: Any, kind: Any) -> str:
 
     In lists and mappings the first entry that is wrong is named.
     """
-    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    outer, inner = _parts(kind)
     fits = True
     inside: Iterator[str] = iter(())
     if kind in _PLAIN:
@@ -225,9 +225,15 @@ def _refusal(what: str, value: Any, kind: Any) -> str:
     return next(filter(None, inside), "") if fits else f"{what}: {shown(value)} must be {_words(kind)}"
 
 
+@functools.lru_cache(maxsize=256)
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return what an annotation is about, and what stands in its brackets."""
+    return typing.get_origin(kind), typing.get_args(kind)
+
+
 def _words(kind: Any) -> str:
     """Return what may stand where an annotation is."""
-    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    outer, inner = _parts(kind)
     if kind in _PLAIN:
         return _PLAIN[kind][0]
     if outer in (typing.Union, types.UnionType):

@@ -32,7 +32,8 @@ def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any])
     every = list(itertools.product(*parts))
     factors = np.array([math.prod(factor for factor, _ in chosen) for chosen in every])
     stacks = [np.array(stack) for stack in zip(*([vector for _, vector in chosen] for chosen in every))]
-    return np.tensordot(factors, form(stacks), axes=1)
+    values = form(stacks)
+    return (factors @ values.reshape(len(every), -1)).reshape(values.shape[1:])
 
 
 def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Array:

@@ -40,7 +40,7 @@ def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: C
     """
     random, found = np.random.default_rng(_SEED), np.zeros(len(values))
     for _ in range(_DRAWS):
-        gaps = values[:, None] - again(lambda array: random.choice((-1.0, 1.0), array.shape))
+        gaps = values[:, None] - again(lambda array: np.copysign(1.0, random.random(array.shape) - 0.5))
         imaginary = gaps.imag if full == math.inf else (gaps.imag + full / 2) % full - full / 2
         found = np.maximum(found, np.hypot(gaps.real, imaginary).min(axis=1))
     return found

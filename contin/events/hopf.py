@@ -197,10 +197,10 @@ def _nearest_pairs(gaps: Array) -> tuple[Indices, Indices]:
 
 def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
     """Return the Hopf points between two places."""
-    if not _passes_as_pair(left[1], right[1]):
-        return []
     first, last = _changes(left[1], right[1])
     one, other = _half_plane(first), _half_plane(last)
+    if not (np.any(one) or np.any(other)):
+        return []
     if np.all(one == other):
         located = [_located(arc, left, right, both) for both in zip(first[one > 0], last[one > 0])]
         found = [point for point in located if point is not None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 
 from contin.core.labels import Label
@@ -64,6 +65,7 @@ def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -
     return points
 
 
+@functools.lru_cache(maxsize=64)
 def fold(name: str) -> Event:
     """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
     return Event(Label.FOLD, name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name,
