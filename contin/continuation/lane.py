@@ -69,8 +69,8 @@ from contin.results.point import Point
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
-#: The length of a step, and its end.
-Handed = tuple[float, Trial]
+#: The length of a step, its beginning and its end.
+Handed = tuple[float, Trial, Trial]
 #: Where steps on a mesh begin: factors, and their place in the lane.
 _Begun = tuple[Factorization, int]
 #: Where the error of the mesh is above its tolerance already, as finer meshes do not lower it, steps whose errors grow by less
@@ -303,7 +303,7 @@ class MeshLane(Lane):
                 asks = not error <= poor
             if asks:
                 if step:
-                    self._hand_over(path, number, abs(step), now)
+                    self._hand_over(path, number, abs(step), (before, after))
                 return number - 2
             before = after
         self._left = path.x[-1], (before, now)
@@ -346,14 +346,18 @@ class MeshLane(Lane):
         """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""
         return changes_little(before, after, self.system.size) if clear == TURNS else clear == CALM
 
-    def _hand_over(self, path: Path, number: int, step: float, place: int) -> None:
-        """Keep a step that was made and asks for a closer look, with its factors, which stand at a place."""
+    def _hand_over(self, path: Path, number: int, step: float, both: tuple[Factorization, Factorization]) -> None:
+        """Keep a step that was made and asks for a closer look, with the factors at both ends: the lane takes others."""
         sign, iterations, error = self._attempt.judged[[SIGN, UPDATES, ERROR]].tolist()
-        factors, self._factors[place] = self._factors[place], self.system.unfilled_factors()
-        self._rooms[place] = self._rooms[place]._replace(factored=self._factors[place].room)
-        factors.sign = sign
-        linear = Linearization(path.tangents[number].copy(), sign, factors)
-        self._handed = step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)
+        both[0].sign, both[1].sign = float(path.numbers[number - 1, SIGN_OF]), sign
+        first, last = (
+            Linearization(tangent.copy(), factors.sign, factors)
+            for tangent, factors in zip(path.tangents[number - 1 : number + 1], both)
+        )
+        begin = Trial(self.system, path.x[number - 1].copy(), first)
+        self._handed = step, begin, Trial(self.system, path.x[number].copy(), last, int(iterations), error)
+        self._factors = [self.system.unfilled_factors() for _ in range(2)]
+        self._rooms = [rooms._replace(factored=factors.room) for rooms, factors in zip(self._rooms, self._factors)]
 
 
 class Lanes:
@@ -386,8 +390,8 @@ class Block:
     ----------
     made : int
         How many.
-    handed : tuple (float, Trial) or None
-        The step behind them, where a kernel has made it and it asks for a closer look: its length, and its end.
+    handed : tuple (float, Trial, Trial) or None
+        The step behind them, where a kernel has made it and it asks for a closer look: its length, its beginning and its end.
     """
 
     def __init__(

@@ -180,6 +180,8 @@ class Continuation:
                 yield point
             if block.made < most or most <= 0:
                 self._handed = block.handed
+                if block.handed is not None and (self._end is None or self._end.factors is None):
+                    self._end = block.handed[1]
                 return
             most = min(2 * most, MOST)
 
@@ -266,7 +268,7 @@ class Continuation:
 
     def _step(self, state: State) -> Step:
         """Predict and correct, halving the step until the corrected point can be believed."""
-        settings, (step, made), self._handed = self.settings, self._handed or (0.0, None), None
+        settings, (step, _, made), self._handed = self.settings, self._handed or (0.0, None, None), None
         if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
             step, made = up_to_limits(state, settings.limits, settings.min_step), None
         finest = max(settings.min_step, _FINEST * step)

@@ -60,13 +60,15 @@ class BranchPointSearch:
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         row, size = state.row, state.system.size
         same = same_sign(before.sign, trial.sign)
+        kept = before.factors is not None  # bordered by a row of the step before
+        if same and kept and calm(before.factors, trial.factors, size):
+            return 0, True
         if same and state.system.cannot_branch(self.arc):
             return 0, True
-        kept = before.factors is not None  # bordered by a row of the step before
         if not kept:
             before.refactor(row)
-        if same and calm(before.factors, trial.factors, size):
-            return 0, True
+            if same and calm(before.factors, trial.factors, size):
+                return 0, True
         watched = is_watched(before.factors, trial.factors, size)
         if watched and not self._sign_changes:
             along = quotients_along(functools.cache(self._whole))
