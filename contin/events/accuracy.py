@@ -54,8 +54,12 @@ class _Bordered:
 
 
 def at_branch_point(trial: Trial) -> Accuracy:
-    """Return the estimated error of a branch point from which a run starts, without the part in the kernel of F_x."""
-    if not trial.system.intervals:
+    """Return the estimated error of a branch point from which a run starts, without the part in the kernel of F_x.
+
+    A cycle of no size, as that at a Hopf point, is the same on every mesh.
+    """
+    system = trial.system
+    if not system.intervals or (system.size_of_solutions is not None and not np.ptp(system.states(trial.x), axis=0).any()):
         return Accuracy(0.0)
     factors: Any = _Bordered(trial)
-    return Accuracy(trial.system.discretization_error(trial.x, factors, trial.functionals))
+    return Accuracy(system.discretization_error(trial.x, factors, trial.functionals))
