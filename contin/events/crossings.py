@@ -8,7 +8,8 @@ eigenvalues negative.
 2. On a mesh the small matrix that condensation leaves (`contin.linalg.ends`) takes its place, as long as the relations between
    mesh points turn little from one point of the curve to the other, all along the mesh, and stay on the same side. The
    condensed matrix cannot tell solutions that have gained a half-wave from those that have not; this is what turn and sides
-   tell. Where they turn more, places between are looked at, too, on the cubic: over a piece of the step they turn less.
+   tell. Where they turn more, places between are looked at, too, on the cubic: over a piece of the step they turn less. Where
+   more than one singular value seems to pass, the whole matrix is asked.
 3. Otherwise the eigenvalues are computed in the directions in which the inverses differ most, by a block Krylov method.
    Directions in which the matrix is nearest to singular are not the same: small singular values that stay as they are would
    hide those that pass.
@@ -82,13 +83,14 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
         Eigenvalues of the quotient; NaN where a matrix is exactly singular, or where too many change.
     """
     condensed = _condensed(before, after)
-    if condensed is not None:
-        return _finite_eigenvalues(condensed)
-    if size > _SMALL:
+    found = np.full(1, np.nan, dtype=complex) if condensed is None else _finite_eigenvalues(condensed)
+    if crossings(found) in ((0, True), (1, True)):
+        return found
+    if size > _SMALL:  # two that pass may be one mode that no end feels, as that of a front between saddles: it turns
         values = _watched(before, after, size)
         if values is not None:
             return values
-    return _all(before, after, size) if size <= _MEDIUM else np.full(1, np.nan, dtype=complex)
+    return _all(before, after, size) if size <= _MEDIUM else found
 
 
 def quotients_along(factors: Callable[[float], Factors]) -> ComplexArray | None:
