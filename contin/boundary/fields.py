@@ -32,12 +32,14 @@ from contin.core.labels import Label
 from contin.core.spectral import Spectral
 from contin.core.trial import Event
 from contin.defining.hopf_curve import HopfCurve
+from contin.draws import generator
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import at_special_point
+from contin.levels import LOCATED, SINGULAR
 from contin.linalg.rightmost import nearest_of, rightmost_of
 
 #: Most rates at Gauss points for which T is formed: its eigenvalues take half a second then. Arnoldi's method takes 0.15 s of
@@ -46,13 +48,9 @@ _DENSE = 1000
 #: Eigenvalues that are kept, those furthest to the right, besides all that are unstable. Fewer than ten would leave out
 #: pairs that move to the axis over one step.
 _KEPT = 24
-#: Eigenvalues of T below this part of the largest are round-off: z is larger than the shift by the inverse of that.
-_INFINITE = 1e-10
 #: The shift is this multiple of a bound on the rates that the equations without derivatives allow: an eigenvalue that is equal
 #: to the bound, as that of a uniform state, is not the shift.
 _BEYOND = 1.37
-#: Rates that are no linear functions of those of the states differ from these by more, relative to their size.
-_LINEAR = 1e-9
 
 
 #: Entries of a matrix, and their rows and columns.
@@ -132,7 +130,7 @@ class Fields(Spectral, Collocation):
                 values = np.linalg.eigvals(inverse(pencil.shift)(np.eye(count)))
             except RuntimeError:  # no shift has an inverse
                 return np.full(2, np.nan, dtype=complex)
-            finite = values[np.abs(values) > _INFINITE * np.abs(values).max(initial=0.0)]
+            finite = values[np.abs(values) > SINGULAR * np.abs(values).max(initial=0.0)]
             found = pencil.shift + 1 / finite
         found = found[np.lexsort((-found.imag, -found.real))]
         kept = max(_KEPT, 2 + int(np.count_nonzero(found.real > 0)))
@@ -210,7 +208,7 @@ class Fields(Spectral, Collocation):
         ProblemError
         """
         batch, states, sizes = self.problem.batch("rates"), self.states_at_gauss_points(x), self.scales.states
-        rates = np.random.default_rng(5).uniform(1, 2, states.shape)
+        rates = generator(__name__).uniform(1, 2, states.shape)
 
         def values(w: Array) -> Array:
             at = self.gauss_times, np.hstack([states, w * sizes]), np.empty((0, 2 * self._n)), self.all_parameters(x)
@@ -222,7 +220,7 @@ class Fields(Spectral, Collocation):
         if not (np.isfinite(there).all() and np.isfinite(linear).all()):
             raise ProblemError("rates: they are not finite at the solution")
         size = np.abs(there).max(initial=0.0)
-        if max(np.abs(rest).max(initial=0.0), np.abs(there - linear).max(initial=0.0)) > _LINEAR * size:
+        if max(np.abs(rest).max(initial=0.0), np.abs(there - linear).max(initial=0.0)) > LOCATED * size:
             raise ProblemError("rates: each must be a linear function of the rates w, without a constant term")
         if not size > 0:
             raise ProblemError("rates: they do not depend on the rates w of any state at the solution")

@@ -37,6 +37,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
+from contin.levels import SINGULAR
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -44,13 +45,6 @@ Symmetry = Callable[[Array, Array], Array]
 #: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from
 #: zero, so that elimination loses no digits.
 _POSITIVE = 0.1
-#: An eigenvalue of H_ll below this part of the largest one is zero: there are fewer controls than states.
-_NO_CONTROL = 1e-10
-#: An eigenvalue of the second variation below this part of the largest one is zero, where a solution is not found: round-off
-#: leaves 1e-15, times the condition number of what is eliminated.
-_SINGULAR = 1e-11
-#: Conditions at the ends whose smallest singular value is below this part of the largest repeat or contradict each other.
-_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +154,7 @@ def _convexity(hll: Array) -> float:
         return np.nan
     values = np.linalg.eigvalsh((hll + hll.swapaxes(1, 2)) / 2)
     largest = np.abs(values).max(axis=1)
-    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + _NO_CONTROL if np.all(largest > 0) else -1.0
+    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + SINGULAR if np.all(largest > 0) else -1.0
 
 
 class Undetermined(StrEnum):
@@ -199,7 +193,7 @@ def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
     if found is None:
         return "energy: it is not convex in the controls there (Legendre's condition)"
     sizes = np.abs(found.eigenvalues)
-    if sizes.size and not sizes.min() > _SINGULAR * sizes.max():
+    if sizes.size and not sizes.min() > SINGULAR * sizes.max():
         return Undetermined.MODE
     return ""
 
@@ -376,11 +370,11 @@ def _roots(hll: Array) -> tuple[Array, Array] | None:
     if not np.isfinite(values).all():
         return None
     largest = values.max(axis=2)
-    if np.any(values < -_NO_CONTROL * largest[:, :, None]) or np.any(largest <= 0):
+    if np.any(values < -SINGULAR * largest[:, :, None]) or np.any(largest <= 0):
         return None
-    k = int(np.max(np.count_nonzero(values > _NO_CONTROL * largest[:, :, None], axis=2)))
+    k = int(np.max(np.count_nonzero(values > SINGULAR * largest[:, :, None], axis=2)))
     values, vectors = values[:, :, -k:], vectors[:, :, :, -k:]
-    root = np.sqrt(np.maximum(values, _NO_CONTROL * largest[:, :, None]))
+    root = np.sqrt(np.maximum(values, SINGULAR * largest[:, :, None]))
     return vectors * root[:, :, None], vectors / root[:, :, None]
 
 
@@ -464,7 +458,7 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Arr
     free = np.eye(size)
     if len(rows):
         _, singular, vectors = np.linalg.svd(rows)
-        if singular[-1] < _DEPENDENT * singular[0]:
+        if singular[-1] < SINGULAR * singular[0]:
             raise ProblemError(Undetermined.CONDITIONS)
         free = vectors[len(rows) :].T
     values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)

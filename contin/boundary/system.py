@@ -17,10 +17,7 @@ from contin.core.protocol import Carrier
 from contin.core.trial import Event
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability
-
-#: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about
-#: that: ten times smaller is round-off of the place itself.
-_CLOSE = 1e-12
+from contin.levels import CORRECTED
 
 
 class Collocation(BoundaryEquations):
@@ -88,7 +85,7 @@ class Collocation(BoundaryEquations):
         if not moving.places.size:
             return self.breaks
         nearest = self.mesh[np.abs(self.mesh - moving.places[:, None]).argmin(axis=1)]
-        off = np.abs(nearest - moving.places) > _CLOSE * (self.mesh[-1] - self.mesh[0])
+        off = np.abs(nearest - moving.places) > CORRECTED * (self.mesh[-1] - self.mesh[0])
         places = np.where(off if closely else ~moving.settled, moving.places, nearest)
         return np.unique(np.concatenate([self.breaks, places]))
 

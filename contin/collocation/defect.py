@@ -35,13 +35,10 @@ from contin.collocation.workspace import Codes, Values, Workspace, put_free
 from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
+from contin.levels import LOCATED
 from contin.linalg.condensation import Factored
 from contin.linalg.substitution import solve
 from contin.shown import shown
-
-#: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of
-#: the domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
-_ASIDE = 1e-9
 
 
 class Finer(NamedTuple):
@@ -192,7 +189,7 @@ class Defect:
         """
         first, last, mesh = rates[:-1], rates[1:], self.system.mesh
         if self.broken.any():
-            aside = _ASIDE * self.h
+            aside = LOCATED * self.h
             first = self.system.field_values(mesh[:-1] + aside, at_mesh[:-1], p)
             last = self.system.field_values(mesh[1:] - aside, at_mesh[1:], p)
         return first, last

@@ -11,6 +11,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.collocation.basis import Basis
 from contin.errors import ProblemError
+from contin.levels import CORRECTED
 
 #: More intervals than any machine has room for: a bound for what users give.
 MOST_INTERVALS = 1_000_000
@@ -63,7 +64,6 @@ class MeshControl:
 
 
 #: Part of the domain within which a mesh point lies on a break.
-_ON_IT = 1e-12
 _NOWHERE = np.empty(0)
 
 
@@ -109,7 +109,7 @@ def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
 
 def near(places: Array, breaks: Array, length: float) -> Array:
     """Return which places lie on a break."""
-    found: Any = (np.abs(places[:, None] - breaks) <= _ON_IT * length).any(axis=1)
+    found: Any = (np.abs(places[:, None] - breaks) <= CORRECTED * length).any(axis=1)
     return np.asarray(found)
 
 
@@ -124,7 +124,7 @@ def with_breaks(mesh: Array, breaks: Array) -> Array:
             if not taken[j]:
                 mesh[j], taken[j] = place, True
                 break
-            if abs(mesh[j] - place) <= _ON_IT * length:
+            if abs(mesh[j] - place) <= CORRECTED * length:
                 break
     return mesh
 

@@ -9,14 +9,10 @@ import numpy as np
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.levels import APART, LOCATED
 from contin.linalg.periodic import Product, fill_logarithms, product_of
 from contin.linalg.transitions import condense
 
-#: Logarithms of multipliers that differ by less are those of a pair.
-_EQUAL = 1e-9
-#: Where the logarithm of the multiplier 1 is larger, the direction of the flow is split off: others are hidden by as
-#: much. It is 1e-7 where both multipliers of a conservative system are 1. Ten times smaller, the same is done there.
-_DRIFTED = 1e-6
 #: What comes of it: multipliers; one of an autonomous system that should be 1 and has drifted; none, which are NaN.
 KNOWN, DRIFTED, NOT_FINITE = range(3)
 
@@ -69,7 +65,7 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         fill_logarithms(room.matrices, room.product, real, imaginary)
         if real[0] != real[0] and not room.planar:  # noqa: PLR0124
             return NOT_FINITE
-        if room.autonomous and not room.planar and not nearest_to_one(room)[1] <= _DRIFTED:
+        if room.autonomous and not room.planar and not nearest_to_one(room)[1] <= APART:
             return DRIFTED
     total, sum_, least = 0.0, 0.0, math.inf
     for q in range(room.quadrature.size):
@@ -81,14 +77,14 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         sum_, least = sum_ + real[a], min(least, real[a])
     nearest, count = nearest_to_one(room)[0], 0
     for a in range(n):
-        count += 1 if real[a] <= least + _EQUAL else 0
-    if not room.autonomous or not real[nearest] <= least + _EQUAL:  # the error of the one that is 1 shall show
+        count += 1 if real[a] <= least + LOCATED else 0
+    if not room.autonomous or not real[nearest] <= least + LOCATED:  # the error of the one that is 1 shall show
         for a in range(n):  # over one interval a Gauss method takes e^-1000 for a number near one
-            if real[a] <= least + _EQUAL:
+            if real[a] <= least + LOCATED:
                 real[a] += (total - sum_) / count
     if room.planar:  # the other one is known whatever round-off has made of the one that is 1
         nearest, error = nearest_to_one(room)
-        one = 0.0 if not error <= _DRIFTED else real[nearest] if imaginary[nearest] == 0.0 else error
+        one = 0.0 if not error <= APART else real[nearest] if imaginary[nearest] == 0.0 else error
         real[0], real[1] = max(one, total), min(one, total)
         imaginary[0] = imaginary[1] = 0.0
     return KNOWN

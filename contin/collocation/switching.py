@@ -20,6 +20,7 @@ import numpy as np
 
 from contin.arrays import Array, Indices
 from contin.collocation.corners import Selections, brackets, narrowed
+from contin.levels import CORRECTED
 
 #: Places on each side of a switch where the gap is looked at, as parts of the distance to the end.
 _PARTS = np.array([0.1, 0.4, 0.7, 1.0])
@@ -32,8 +33,6 @@ _SETTLED = 1e-13
 #: Distance from a switch, as a part of half an interval, at which a gap that does not vanish there is told from one that does,
 #: and the part of the largest gap nearby that it has there at least. At a corner it has 1e-5 of that.
 _AT_ONCE, _JUMP = 1e-5, 1e-2
-#: Two places closer than this part of the domain are one; so are one and an end, or a break that does not move.
-_APART = 1e-11
 #: More places than this are no corners but a curve: a table of a hundred knots that a state passes on its way up and down.
 _MOST = 200
 
@@ -119,7 +118,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         kept = gap * half > _SMOOTH
         costs = np.fmin(missed[0] * (places - inside[0]), missed[1] * (inside[1] - places))
         jumps = np.fmin(*beside) > _JUMP * gap
-    edge = _APART * (mesh[-1] - mesh[0])
+    edge = CORRECTED * (mesh[-1] - mesh[0])
     known = np.concatenate([[mesh[0], mesh[-1]], system.breaks])
     kept &= (np.abs(places[:, None] - known) > edge).all(axis=1)
     return _merged(Switching(places[kept], costs[kept], jumps[kept], tuple(selections.names[k] for k in which[kept])), system)
@@ -153,7 +152,7 @@ def _merged(found: Switching, system: Any) -> Switching:
     order = np.argsort(found.places, kind="stable")
     places, costs, jumps = found.places[order], found.costs[order], found.jumps[order].astype(bool)
     names = [found.names[k] for k in order]
-    apart = _APART * (system.mesh[-1] - system.mesh[0])
+    apart = CORRECTED * (system.mesh[-1] - system.mesh[0])
     group = np.cumsum(np.append(0, np.diff(places) > apart))
     first = np.searchsorted(group, np.arange(group[-1] + 1))
     largest, any_jump = np.maximum.reduceat(costs, first), np.logical_or.reduceat(jumps, first)

@@ -16,15 +16,15 @@ from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
 from contin.core.system import System
+from contin.draws import generator
 from contin.errors import ConvergenceError
+from contin.levels import APART
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
-#: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
-_MOVED = 1e-6
 #: Number of results at points that are kept, subspaces and eigenvalues: a step asks for those of a few iterates.
 _KEPT = 24
 _Result = TypeVar("_Result")
@@ -356,7 +356,7 @@ class ConnectionEquations(Conditioned):
 
     def _left_null_vector(self, x: Array, factors: Factors | None) -> Array:
         """Return it from solutions of F_x^T y + m row = e for the user's two parameters, combined so that no row is left."""
-        random = np.random.default_rng(11)
+        random = generator(__name__)
         if factors is None:
             _, factors = self.linearize(x, (random.standard_normal(self.size),))
         own = [name for name in self.free if name not in self.problem.multipliers]
@@ -462,7 +462,7 @@ class ConnectionEquations(Conditioned):
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
         mesh = self._better_mesh(x, control)
-        if mesh is None and np.abs(x - self.reference).max() <= _MOVED * np.abs(x).max():
+        if mesh is None and np.abs(x - self.reference).max() <= APART * np.abs(x).max():
             return None
         renewed = self.with_reference(x)
         return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)

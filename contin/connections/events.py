@@ -35,24 +35,15 @@ from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
+from contin.levels import CORRECTED, DOUBLED, LOCATED
 from contin.linalg.orientation import oriented
 
-#: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
-#: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
-_NOTHING = 1e-12
-#: A sum of eigenvalues below this part of their sizes is round-off: of a reversible or conservative system it is zero
-#: everywhere. Equilibria are known to Newton's tolerance, 1e-10; ten times larger, a neutral saddle is located to 1e-8 only.
-_NEUTRAL = 1e-9
-#: An orbit that comes nearer to the saddle, over its largest state, has no direction there: Newton's error is 1e-10 of it.
-_TOO_NEAR = 1e-8
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
 #: An eigenvalue whose real part is below this part of the largest one lies on the axis; a double zero is known to 1e-5.
 _ON_AXIS = 1e-3
 #: The labels of the test functions whose points `named` calls otherwise.
 _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
-#: An eigenvalue with a smaller imaginary part, relative to its size, is real.
-_REAL = 1e-8
 
 
 def homoclinic_points(system: ConnectionEquations) -> list[Event]:
@@ -196,13 +187,13 @@ def _leading_vectors(trial: Trial, side: int) -> tuple[Array, Array]:
 
 
 def _is_complex(value: complex) -> bool:
-    return abs(value.imag) > _REAL * abs(value)
+    return abs(value.imag) > DOUBLED * abs(value)
 
 
 def _total(first: float, second: float) -> float:
     """Return the sum of two real parts; 0 where it is round-off."""
     total = float(first + second)
-    return total if abs(total) > _NEUTRAL * (abs(first) + abs(second)) else 0.0
+    return total if abs(total) > LOCATED * (abs(first) + abs(second)) else 0.0
 
 
 def _ends(side: int) -> Event:
@@ -245,14 +236,14 @@ def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) 
 def _component(unit: Array, vector: Array) -> float:
     """Return the component of a vector along one of unit length; 0 where it is round-off."""
     component = float(unit @ vector)
-    return component if abs(component) > _NOTHING * float(np.linalg.norm(vector)) else 0.0
+    return component if abs(component) > CORRECTED * float(np.linalg.norm(vector)) else 0.0
 
 
 def _orbit_flip(side: int) -> Event:
     def component(trial: Trial) -> float:
         system, x = _system(trial), trial.x
         gap = system.apart(x)[1 - side]
-        if not np.linalg.norm(gap) > _TOO_NEAR * np.max(np.abs(x[: system.state_size])):
+        if not np.linalg.norm(gap) > DOUBLED * np.max(np.abs(x[: system.state_size])):
             return float("nan")
         return _component(_leading_vectors(trial, side)[1], gap)
 
@@ -269,7 +260,7 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
         system, x = _system(trial), trial.x
         if not known:
             there = system.left_null_vector(system.reference)
-            if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > _NOTHING:
+            if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > CORRECTED:
                 return float("nan")
         adjoint = system.adjoint_at_ends(x, system.left_null_vector(x, trial.factors))[side]
         unit = _leading_vectors(trial, side)[0]

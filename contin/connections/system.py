@@ -12,10 +12,8 @@ from contin.defining.event_curve import EventCurve
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
+from contin.levels import APART
 from contin.problems.own_names import TIME
-
-#: Equilibria that are nearer to each other than this part of the orbit's size are one.
-_SAME = 1e-6
 
 
 class ConnectionCollocation(ConnectionEquations):
@@ -37,7 +35,7 @@ class ConnectionCollocation(ConnectionEquations):
             return
         count, names = len(problem.state_names), problem.multipliers
         first, last = (np.array([self.parameter(x, name) for name in part]) for part in (names[:count], names[count:]))
-        if np.abs(first - last).max() <= _SAME * float(np.ptp(self.states(x), axis=0).max()):
+        if np.abs(first - last).max() <= APART * float(np.ptp(self.states(x), axis=0).max()):
             place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
             raise ProblemError(
                 f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or "

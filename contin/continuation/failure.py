@@ -14,6 +14,7 @@ from contin.core.settings import Settings
 from contin.core.state import Reason, State, Stop
 from contin.core.step import aims, corrected, judged, predict
 from contin.core.trial import Event, Trial
+from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.names import exact_text
 
@@ -77,7 +78,7 @@ def _bend(state: State, length: float) -> tuple[float, float]:
     system, x, way = state.system, state.x, length * state.tangent
     here = system.residual(x)
     forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
-    across = np.random.default_rng(17).standard_normal(system.size)
+    across = generator(__name__).standard_normal(system.size)
     across *= length / np.sqrt(inner(system, across, across))
     usual = system.residual(x + across) - here
     return float(np.max(np.abs(forth + back), initial=0.0)), float(np.max(np.abs(usual), initial=0.0))

@@ -16,6 +16,7 @@ from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import Reason, State, Stop, standing_at
 from contin.core.trial import Event, Linearization, Trial, linearization
+from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.accuracy import accuracy_of
 from contin.events.significance import growing
@@ -110,7 +111,7 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
     """
     fixed = np.zeros(system.size)
     fixed[system.parameter_index(primary)] = 1.0
-    across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
+    across = generator(__name__).standard_normal(system.size) * np.sqrt(system.weights)
     failed: ConvergenceError | None = None
     beside = x + _BESIDE * across / np.abs(across).max()  # of a branch point, where both are singular
     for start, row in ((x, fixed), (x, across), (beside, across)):

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array, Pattern
 from contin.core.newton import UNITS, Newton, rounded_off
 from contin.core.protocol import Carrier, Discretization
@@ -131,7 +132,7 @@ class _FirstPoint:
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
         self.tangent = np.zeros_like(x) if self._stands_still(rate) else linear.tangent / rate
-        self._random = np.random.default_rng(11)
+        self._random = draws.generator(__name__)
         self._others: list[tuple[Array, Any, float]] = []
 
     def _stands_still(self, rate: float) -> bool:
@@ -417,7 +418,7 @@ class _FirstPoint:
 
     def _rounded(self, v: Array) -> Array:
         """Return a vector changed by one unit in the last place, up or down."""
-        found: Array = v * (1 + np.copysign(np.finfo(float).eps, self._random.random(v.size) - 0.5))
+        found: Array = draws.rounded(self._random, v)
         return found
 
     def _kept(self, v: Array, kept: Pattern) -> Array:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import checks, draws
 from contin.arrays import Array
 from contin.collocation.one_call import (
     CLOSE,
@@ -49,8 +49,6 @@ from contin.shown import shown
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.
 UNITS = 30
-#: Draws of the signs of these units. One more changes the estimate by a few percent.
-_DRAWS = 3
 #: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
 _COARSE = 1e-3
 #: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
@@ -337,10 +335,10 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
     """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
-    random, noise = np.random.default_rng(5), np.zeros_like(x)
+    random, noise = draws.generator(__name__), np.zeros_like(x)
     residual, factors = system.linearize(x, rows)
-    for _ in range(_DRAWS):
-        rounded = x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))
+    for _ in range(draws.DRAWS):
+        rounded = draws.rounded(random, x)
         change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
         noise = np.maximum(noise, np.abs(factors.solve(change)))
     return noise

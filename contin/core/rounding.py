@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array, ComplexArray, Mask
 
 #: Round-off of a multiplier is looked at where the real part of its logarithm is smaller. In the restricted three-body problem
@@ -22,8 +23,6 @@ NEAR_AXIS = 1e-9
 #: Round-off of a number, relative to 1 + its size: a parameter that differs by no more is the same at two points, and no error
 #: is given as less. It is 16 units in the last place, as sums over a mesh lose a digit.
 LAST_PLACES = 16 * float(np.finfo(float).eps)
-#: Random roundings, and the seed that draws them. The largest change of ten is at most twice that of three.
-_DRAWS, _SEED = 3, 13
 #: A real part is zero if it is below so many times the largest change. With three draws the change is a tenth of the round-off
 #: by chance once in 5,000 times.
 _CERTAIN = 10.0
@@ -38,9 +37,9 @@ def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: C
     ``again(signs)`` computes them again; ``signs(array)`` are random signs of the shape of an array. Imaginary parts are alike
     up to multiples of ``full``.
     """
-    random, found = np.random.default_rng(_SEED), np.zeros(len(values))
-    for _ in range(_DRAWS):
-        gaps = values[:, None] - again(lambda array: np.copysign(1.0, random.random(array.shape) - 0.5))
+    random, found = draws.generator(__name__), np.zeros(len(values))
+    for _ in range(draws.DRAWS):
+        gaps = values[:, None] - again(lambda array: draws.signs(random, array))
         imaginary = gaps.imag if full == math.inf else (gaps.imag + full / 2) % full - full / 2
         found = np.maximum(found, np.hypot(gaps.real, imaginary).min(axis=1))
     return found

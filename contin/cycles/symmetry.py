@@ -10,16 +10,13 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array, Function
+from contin.draws import PLACES, generator
 from contin.errors import ProblemError
+from contin.levels import LOCATED
 from contin.problems.angles import whole_rounds
 
 #: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
 _MOST = 60
-#: S^n is 1, and F(S u) is S F(u), up to this part of their size: entries like cos(2 pi / 3) are known to round-off. Ten times
-#: larger, matrices typed with eight digits would pass.
-_EQUAL = 1e-9
-#: Places at which the symmetry of a field is checked, from this seed, with states between -1 and 1.
-_PLACES, _SEED = 5, 7
 
 
 def symmetry_matrix(symmetry: object, count: int) -> Array:
@@ -52,7 +49,7 @@ def order_of(matrix: Array) -> int:
     """
     one, power = np.eye(len(matrix)), matrix
     for order in range(1, _MOST + 1):
-        if np.abs(power - one).max(initial=0.0) <= _EQUAL:
+        if np.abs(power - one).max(initial=0.0) <= LOCATED:
             return order
         power = power @ matrix
     raise ProblemError(f"symmetry: no power of the matrix up to {_MOST} is the identity")
@@ -70,13 +67,13 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
     of_state: Any = namedtuple("U", names)  # type: ignore[misc]  # noqa: PYI024
     of_parameters: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
     p = of_parameters(**parameters)
-    for u in np.random.default_rng(_SEED).uniform(-1, 1, (_PLACES, len(names))):
+    for u in generator(__name__).uniform(-1, 1, (PLACES, len(names))):
         try:
             first, turned = (np.array(field(of_state(*map(float, v)), p), dtype=float) for v in (u, matrix @ u))
         except (ArithmeticError, ValueError):
             continue  # a root or logarithm of a negative number
         gap = np.abs(turned - matrix @ first)
-        if np.any(gap > _EQUAL * (1 + np.abs(first).max())):
+        if np.any(gap > LOCATED * (1 + np.abs(first).max())):
             raise ProblemError(
                 f"symmetry: the field does not have it; the rate of {names[int(gap.argmax())]} at S u differs by "
                 f"{gap.max():.3g} from that of S F(u) for u = {', '.join(f'{value:.3g}' for value in u)}"
@@ -93,7 +90,7 @@ def check_lattice(matrix: Array, names: Sequence[str], angles: Mapping[str, floa
     periods = np.array([angles.get(name, 0.0) for name in names])
     for name, period in angles.items():
         moved = period * matrix[:, names.index(name)]
-        if np.any(np.abs(moved - whole_rounds(moved, periods)) > _EQUAL):
+        if np.any(np.abs(moved - whole_rounds(moved, periods)) > LOCATED):
             raise ProblemError(f"symmetry: where {name} goes round once, S u must change by whole rounds of angles")
 
 

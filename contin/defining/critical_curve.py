@@ -28,13 +28,12 @@ from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.coefficient import Coefficient
 from contin.events.normal_forms import Form
+from contin.levels import APART
 from contin.linalg.border import Bordered, null_vectors
 
 #: The imaginary parts of null vectors count where that of the eigenvalue is larger than this; they vanish with it, and are
 #: divided by it. Ten times larger or smaller, the curves of the tests are the same.
 _ALMOST_REAL = 1e-2
-#: An eigenvalue with a real part below this part of its size is on the axis: it is at a located zero of the product.
-_ON_AXIS = 1e-5
 
 
 class CriticalCurve(Defining):
@@ -173,5 +172,5 @@ def signed_smallest(factors: ComplexArray) -> float:
 def other_pairs(values: ComplexArray) -> tuple[float, bool]:
     """Return a number that vanishes where two of the eigenvalues have the sum zero, and whether these are a complex pair."""
     i, j = np.triu_indices(len(values), 1)
-    on_axis = (np.abs(values.real) < _ON_AXIS * np.abs(values)) & (values.imag > 0)
+    on_axis = (np.abs(values.real) < APART * np.abs(values)) & (values.imag > 0)
     return signed_smallest(values[i] + values[j]), bool(on_axis.any())

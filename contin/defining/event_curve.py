@@ -27,6 +27,7 @@ from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
+from contin.draws import generator
 from contin.events.arc import SpecialPoint
 from contin.linalg.border import orthonormal, rows_fit
 
@@ -66,7 +67,7 @@ class EventCurve(Defining):
 
     def computed(self, x: Array) -> _Solutions:
         """Return the solutions of F = 0 around x; rows Phi are those that are kept, as long as they fit."""
-        rows = np.random.default_rng(11).standard_normal((self.size - self.base.equations, self.size))
+        rows = generator(__name__).standard_normal((self.size - self.base.equations, self.size))
         found = self._solved(x, rows if self.borders is None else self.borders)
         if self.borders is None or not rows_fit(found.tangents, self.weights):
             self.borders = orthonormal(found.tangents, self.weights) * self.weights

@@ -26,9 +26,7 @@ from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve, degenerate, other_pairs, signed_smallest
 from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.normal_forms import coefficient, pair
-
-#: A kappa below this part of its first value is zero: Bogdanov-Takens points are located more exactly than that.
-_NO_FREQUENCY = 1e-10
+from contin.levels import SINGULAR
 
 T = TypeVar("T")
 
@@ -61,7 +59,7 @@ class HopfCurve(CriticalCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the first Lyapunov coefficient; NaN at Bogdanov-Takens points and neutral saddles."""
-        if self.kappa(x) <= _NO_FREQUENCY * self.kappa_size:
+        if self.kappa(x) <= SINGULAR * self.kappa_size:
             return UNKNOWN
         return coefficient(self.base, self.inside(x), pair, self.imaginary_part(x))
 

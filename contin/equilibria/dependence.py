@@ -14,25 +14,16 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.draws import ASIDE, PLACES, generator
 from contin.equilibria.equations import AlgebraicEquations
+from contin.levels import APART, CERTAIN, LOCATED
 from contin.linalg.dense import DenseFactors
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000
-#: Places that are compared: with three, null vectors that differ by a thousandth do not pass for the same.
-_PLACES, _SEED = 3, 7
-#: How far these are apart, relative to 1 + |u|. Ten times nearer, null vectors that turn slowly would count as fixed; ten times
-#: further, more places are outside of the domain of the equations.
-_APART = 0.1
 #: Sizes of the states at places where a total must stay, one after the other: conditions on states, such as a threshold, would
 #: have to lie beyond all of them to be missed.
 _SIZES = (1.0, 0.1, 3.0, 10.0, 100.0)
-#: A singular value is zero below so many units in the last place of the largest, times the size of the matrix.
-_ZERO_UNITS = 10.0
-#: Parts of a null vector below this are round-off, and so is the value of a combination of equations relative to its terms.
-_LEAST = 1e-9
-#: Components below this part of the largest are no pivots: above round-off of null vectors, and below any factor that is meant.
-_PIVOT = 1e-6
 #: Terms of a combination that are written out.
 _TERMS = 6
 
@@ -46,7 +37,7 @@ def dependence(system: AlgebraicEquations, x: Array) -> str:
         if not DenseFactors(matrix).reciprocal_condition <= _zero(len(matrix)):
             return ""
         places = _around(system, x)
-    if len(places) < _PLACES:
+    if len(places) < PLACES:
         return ""
     matrices = [system.jacobian(place) for place in places]
     equations = _reduced(_null_vectors(np.hstack(matrices).T))
@@ -64,10 +55,10 @@ def conservation_laws(problem: Any) -> Array:
     none = np.empty((0, n))
     if not problem.dynamics or n > MOST_STATES:
         return none
-    random = np.random.default_rng(_SEED)
+    random = generator(__name__)
     columns: list[Array] = []
     for size in _SIZES:
-        p = {name: value + _APART * (1 + abs(value)) * random.uniform(0.1, 1.0) for name, value in problem.parameters.items()}
+        p = {name: value + ASIDE * (1 + abs(value)) * random.uniform(0.1, 1.0) for name, value in problem.parameters.items()}
         system, u = problem.discretized((), p), size * random.uniform(0.1, 1.0, n)
         with contextlib.suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):
             matrix, rates = system.jacobian(u), system.residual(u)
@@ -76,24 +67,24 @@ def conservation_laws(problem: Any) -> Array:
             if not columns and not DenseFactors(_balanced(matrix)[0]).reciprocal_condition <= _zero(n):
                 return none
             columns += [matrix, rates[:, None]]
-    vectors = _null_vectors(np.hstack(columns).T) if len(columns) >= 2 * _PLACES else none
+    vectors = _null_vectors(np.hstack(columns).T) if len(columns) > len(_SIZES) else none
     if len(vectors) == n:
         return none  # nothing moves
     forms = [_reduced(vectors), _reduced(vectors[:, ::-1])[:, ::-1]]
     fewest: Array = min(forms, key=lambda form: np.count_nonzero(form < 0))
-    found: Array = np.where(np.abs(fewest - np.rint(fewest)) < _LEAST, np.rint(fewest), fewest)
+    found: Array = np.where(np.abs(fewest - np.rint(fewest)) < LOCATED, np.rint(fewest), fewest)
     return none if any(problem.angles.get(problem.state_names[i]) for i in np.flatnonzero(found.any(axis=0))) else found
 
 
 def _around(system: AlgebraicEquations, x: Array) -> list[Array]:
     """Return places near x where the equations are defined; above x first, where logarithms and roots are."""
-    random, found = np.random.default_rng(_SEED), []
-    for sign in (1.0, 1.0, 1.0, -1.0, -1.0, -1.0):
-        place = x + sign * _APART * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
+    random, found = generator(__name__), []
+    for sign in np.repeat((1.0, -1.0), PLACES):
+        place = x + sign * ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
         with contextlib.suppress(ArithmeticError, ValueError):
             if np.isfinite(system.jacobian(place)).all() and np.isfinite(system.residual(place)).all():
                 found.append(place)
-    return found[:_PLACES]
+    return found[:PLACES]
 
 
 def _balanced(matrix: Array) -> tuple[Array, Array]:
@@ -107,7 +98,7 @@ def _balanced(matrix: Array) -> tuple[Array, Array]:
 
 def _zero(size: int) -> float:
     """Return the smallest singular value of a matrix of this size that is not round-off, of 1 for the largest."""
-    return float(_ZERO_UNITS * size * np.finfo(float).eps)
+    return float(CERTAIN * size * np.finfo(float).eps)
 
 
 def _null_vectors(matrix: Array) -> Array:
@@ -125,13 +116,13 @@ def _reduced(vectors: Array) -> Array:
         if number == len(vectors):
             break
         chosen = number + int(np.abs(vectors[number:, place]).argmax())
-        if abs(vectors[chosen, place]) > _PIVOT * np.abs(vectors[number:]).max():
+        if abs(vectors[chosen, place]) > APART * np.abs(vectors[number:]).max():
             vectors[[number, chosen]] = vectors[[chosen, number]]
             vectors[number] /= vectors[number, place]
             others = np.arange(len(vectors)) != number
             vectors[others] -= vectors[others, place, None] * vectors[number]
             number += 1
-    found: Array = np.where(np.abs(vectors) > _LEAST, vectors, 0.0)
+    found: Array = np.where(np.abs(vectors) > LOCATED, vectors, 0.0)
     return found
 
 
@@ -148,7 +139,7 @@ def _of_equations(system: AlgebraicEquations, places: Sequence[Array], vectors: 
     for vector in vectors:
         terms = vector * residuals
         value = float(terms.sum(axis=1).mean())
-        if abs(value) > _LEAST * np.abs(terms).max():
+        if abs(value) > LOCATED * np.abs(terms).max():
             what = f"{written(vector, numbers)} is {value:.6g} whatever the states are"
             return f"residual: {what}: there is no solution, unless a parameter takes this number to zero"
     combined = checks.listed(written(vector, numbers) for vector in vectors)
@@ -176,7 +167,7 @@ def written(vector: Array, names: Sequence[str]) -> str:
     text = ""
     places = np.flatnonzero(vector)
     for i in places[:_TERMS]:
-        size = "" if abs(abs(vector[i]) - 1) < _LEAST else f"{abs(vector[i]):.6g} "
+        size = "" if abs(abs(vector[i]) - 1) < LOCATED else f"{abs(vector[i]):.6g} "
         sign = "-" if vector[i] < 0 else "+"
         text += f" {sign} {size}{names[i]}" if text else f"{'-' if vector[i] < 0 else ''}{size}{names[i]}"
     return text + (" + ..." if len(places) > _TERMS else "")

@@ -19,6 +19,7 @@ from contin.core.spectral import Spectral
 from contin.core.system import System
 from contin.equilibria.given import check_given
 from contin.functions.batch import Batch, Columns
+from contin.levels import CORRECTED
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors
 from contin.linalg.rightmost import nearest, rightmost
@@ -283,7 +284,7 @@ class AlgebraicEquations(Spectral, System):
         if not self.is_sparse:
             return False
         matrix: Any = self.as_field().field_jacobian(x)
-        return bool(abs(matrix - matrix.T).max() <= _SYMMETRIC * abs(matrix).max())
+        return bool(abs(matrix - matrix.T).max() <= CORRECTED * abs(matrix).max())
 
     def eigenvalue_near(self, x: Array, value: complex) -> complex:
         """Return the eigenvalue of F_u that is nearest to a value; NaN where none is found."""
@@ -371,8 +372,6 @@ class AlgebraicEquations(Spectral, System):
 _MANY = 200
 #: Largest part of its entries that may differ from zero.
 _FEW = 0.1
-#: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
-_SYMMETRIC = 1e-13
 #: The t of functions that do not take it.
 _NO_TIME = np.zeros(1)
 

@@ -9,14 +9,13 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.differences import derivative
+from contin.draws import ASIDE, generator, signs
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.levels import LOCATED
 
-#: Distance of the place of the comparison from the first one, where terms may vanish, relative to 1 + |u|.
-_ASIDE = 0.05
-#: Largest difference, in estimated errors of differences, and in sums of the sizes of the terms: differences of fourth order
-#: are wrong by less than 1e-10 of these. Ten times larger, wrong entries of terms that are small pass.
-_SAFE, _LEAST = 20.0, 1e-9
+#: Largest difference, in estimated errors of differences. Ten times larger, wrong entries of terms that are small pass.
+_SAFE = 20.0
 
 
 class _Given(Protocol):
@@ -44,9 +43,9 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
         return
     problem.compared.append(True)
     batch, none = problem.batch("residual"), np.empty((0, u.size))
-    random, size = np.random.default_rng(3), 1 + np.abs(u)
-    place = u + _ASIDE * size * random.uniform(-1, 1, u.size)
-    direction = size * random.uniform(0.5, 1.0, u.size) * random.choice([-1.0, 1.0], u.size)
+    random, size = generator(__name__), 1 + np.abs(u)
+    place = u + ASIDE * size * random.uniform(-1, 1, u.size)
+    direction = size * random.uniform(0.5, 1.0, u.size) * signs(random, u)
 
     def slope(along: Array) -> tuple[Any, float]:
         return derivative(lambda s: batch.values(np.zeros(1), (place + s * along)[None], none, p)[0])
@@ -60,7 +59,7 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
             break
     else:
         return  # nothing to compare with: Newton's method will say that there are no values
-    excess = np.abs(matrix @ direction - wanted) - _SAFE * error - _LEAST * (terms + np.abs(wanted))
+    excess = np.abs(matrix @ direction - wanted) - _SAFE * error - LOCATED * (terms + np.abs(wanted))
     if np.any(excess > 0):
         row = int(np.argmax(excess))
         given = matrix[[row]].toarray()[0] if hasattr(matrix, "toarray") else matrix[row]

@@ -20,13 +20,11 @@ from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
+from contin.levels import LOCATED
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 from contin.problems.vector_field import combined, returning
-
-#: A rate below this part of the terms it may consist of is zero: solutions are known to 1e-12, and their rates, too.
-_AT_REST = 1e-8
 
 #: Most states, with a sparse matrix of some GB: a bound so that a slip of the keyboard is a sentence and not a full memory.
 _MOST_STATES = 1_000_000
@@ -353,7 +351,7 @@ class ReducedProblem(AlgebraicProblem):
         states = self._states(u, p[known:])
         system = self.whole.discretized((), dict(zip(self.whole.parameters, map(float, p))))
         rates, matrix = system.residual(states), system.jacobian(states)
-        noise = _AT_REST * np.abs(matrix) @ (1 + np.abs(states))
+        noise = LOCATED * np.abs(matrix) @ (1 + np.abs(states))
         for total, state in zip(self.totals, self.following):  # first those of the totals
             place = self.whole.state_names.index(state)
             if not abs(rates[place]) <= noise[place]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.trial import Trial
+from contin.draws import generator
 
 #: An error up to this many times what Newton's method has left, measured alike, is round-off. On 146 to 328 intervals of the
 #: bank's stiffest problem it is 0.5 to 3 times that. Ten times larger, an error of 1e-10 would stay where Newton leaves 1e-12.
@@ -39,7 +40,7 @@ class _Bordered:
     """Factors of [[F_x, c], [row, 0], [r, 0]] at a simple branch point, for right-hand sides of [F_x; row]."""
 
     def __init__(self, trial: Trial) -> None:
-        system, random = trial.system, np.random.default_rng(17)
+        system, random = trial.system, generator(__name__)
         self._size = system.size
         rows = np.zeros((2, system.size + 1))
         rows[0, :-1] = system.weights * trial.tangent

@@ -18,6 +18,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.protocol import Discretization
+from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.linalg.border import FITS, Bordered, cosine, orthonormal, rows_fit
 from contin.linalg.singular import smallest_directions
@@ -96,7 +97,7 @@ class BorderedMatrix:
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
     """Return borders made of null vectors at x: of those that random borders give, or rows about the ``kernel``."""
-    random = np.random.default_rng(20240501)
+    random = generator(__name__)
     phi = orthonormal(random.standard_normal((2, system.size)) if kernel is None else kernel, system.weights)
     matrix = BorderedMatrix(system, x, phi, random.standard_normal(system.equations) / np.sqrt(system.equations))
     if not np.isfinite(matrix.kernel).all():

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
@@ -40,9 +41,6 @@ _UNEXPLAINED = 0.5
 #: Singular values of the Hessian below this part of the largest count as zero: a gradient along their direction is not
 #: followed.
 _FLAT = 1e-9
-
-#: Steps of Newton's method that are made of round-off. The largest of three is seldom below half of what is usual.
-_DRAWS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,11 +216,11 @@ def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> A
     >>> bool(np.all(rounded_off(system, found, Newton()) < 1e-15))
     True
     """
-    random, noise = np.random.default_rng(5), np.zeros_like(point.x)
+    random, noise = draws.generator(__name__), np.zeros_like(point.x)
     with np.errstate(all="ignore"):
         search = _Search(system, point.x, newton, point.kernel)
-        for _ in range(_DRAWS):
-            search.x = before = search.x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), search.x.size))
+        for _ in range(draws.DRAWS):
+            search.x = before = draws.rounded(random, search.x)
             if not search.advance():
                 break
             noise = np.maximum(noise, np.abs(search.x - before))

@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array, Numbers
 
 #: A coefficient is computed again at a point moved by so much, relative to 1 + |x|: points are located to 1e-14 at best.
 #: Ten times larger, errors are ten times as large.
 _MOVED = 1e-14
-#: It is computed as often as this, with directions from this seed.
-_DRAWS, _SEED = 2, 5
 #: Its error is so many times the largest change: one draw may hardly count, and a coefficient that is infinite, as at a period
 #: doubling in a conservative system, changes by less than a tenth of its value once in 20 draws. Ten times larger, errors are
 #: ten times as large.
@@ -57,9 +56,9 @@ class Coefficient:
         value, size = float(best.sum().real), float(np.abs(best).sum())
 
         def estimate() -> float:
-            random, changes = np.random.default_rng(_SEED), []
-            for _ in range(_DRAWS):
-                moved = x + _MOVED * (1 + np.abs(x)) * random.choice((-1.0, 1.0), x.size)
+            random, changes = draws.generator(__name__), []
+            for _ in range(draws.DRAWS):
+                moved = x + _MOVED * (1 + np.abs(x)) * draws.signs(random, x)
                 changes.append(abs(value - float(terms(moved).sum().real)))
             return float(_CERTAIN * max(changes) + of_derivatives * size)
 

@@ -24,6 +24,7 @@ from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
+from contin.draws import generator
 from contin.errors import ProblemError
 from contin.linalg.border import orthonormal, rows_fit
 
@@ -53,7 +54,7 @@ class Stationarity:
     def __init__(self, system: System, x: Array, column: str, held: Sequence[int] = (), phi: Array | None = None) -> None:
         count = system.size - system.equations - len(held)
         if phi is None:
-            phi = np.random.default_rng(11).standard_normal((count, system.size))
+            phi = generator(__name__).standard_normal((count, system.size))
         rows = np.zeros((len(held) + count, system.size))
         rows[np.arange(len(held)), list(held)] = 1.0
         rows[len(held) :] = phi

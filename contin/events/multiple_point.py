@@ -23,6 +23,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
+from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
 from contin.linalg.border import orthonormal
@@ -332,7 +333,7 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     manifold.at(s)
     second, linear = manifold.second()
     quadratic = manifold.third(second) / 2
-    random = np.random.default_rng(7)
+    random = generator(__name__)
     starts = random.standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
     outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)

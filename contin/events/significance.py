@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array
 from contin.core.newton import UNITS, Newton, correct
 from contin.core.protocol import Discretization
@@ -73,11 +74,11 @@ def _noise(trial: Trial, fold: Event) -> float:
     size, own = (float(np.linalg.norm(vector[: system.state_size])) for vector in (x, tangent))
     if not size:
         return 0.0
-    random, noise, at = np.random.default_rng(7), 0.0, system.parameter_index(fold.name)
+    random, noise, at = draws.generator(__name__), 0.0, system.parameter_index(fold.name)
     residual, factors = system.linearize(x, (system.weights * tangent,))
-    for _ in range(_DRAWS):
-        error = system.residual(x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))) - residual
-        noise = max(noise, abs(factors.solve(np.append(error * random.choice((-1.0, 1.0), error.size), 0.0))[at]))
+    for _ in range(draws.DRAWS):
+        error = system.residual(draws.rounded(random, x)) - residual
+        noise = max(noise, abs(factors.solve(np.append(error * draws.signs(random, error), 0.0))[at]))
     return float(UNITS * noise * own / size)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Function
+from contin.draws import generator
 from contin.errors import ProblemError
 from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, numbers
@@ -24,13 +25,11 @@ from contin.functions.recorded_function import RecordedFunction
 from contin.functions.signature import PROBES, Arguments, Signature, UserFunction, component_count, flat
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Tape, Unrecordable
+from contin.levels import LOCATED
 
 #: Largest number of paths through the decisions of one function, and of decisions on a path. A path doubles the operations at
 #: most; with ten times as many, a function of 100 operations could become one of 64,000.
 _PATHS = 64
-#: Relative difference of a tape's value from Python's beyond which a function is not recorded: the order of sums and the last
-#: bits of the C library's functions make 1e-13, cancellation ten times that.
-_AGREES = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +207,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
     Unrecordable
         They differ.
     """
-    random = np.random.default_rng(11)
+    random = generator(__name__)
     for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1
@@ -221,7 +220,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
         computed = np.array(recording.tape.evaluate(places, values))
         known = np.isfinite(expected)
         scale = 1 + np.abs(expected[known]).max(initial=0.0)
-        if np.any(np.abs(computed[known] - expected[known]) > _AGREES * scale):
+        if np.any(np.abs(computed[known] - expected[known]) > LOCATED * scale):
             raise Unrecordable("its values are not those of its recording")
 
 

@@ -19,6 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from contin.arrays import Array, Numbers
+from contin.draws import generator
 
 #: Rounds of inverse iteration from random borders; each divides the error by the ratio of the smallest singular values. With
 #: ten, the curves of the tests are the same.
@@ -114,7 +115,7 @@ def null_vectors(
         Returns the left and the right null vector, which may be complex.
     """
     if borders is None:
-        random = np.random.default_rng(11)
+        random = generator(__name__)
         borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
     found, root = bordered(*borders), np.sqrt(weights)
     for _ in range(_ROUNDS):

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.levels import APART
 
 #: Part of the largest component from which another one counts as equal. On a mesh of ten intervals the humps of sin(8 pi t), of
 #: equal height, differ by 5 % at the nodes. 0.9, 0.87 and 0.71 are ratios of symmetric problems: it must be none of them.
@@ -23,9 +24,6 @@ _EQUAL = 0.89
 #: step: 1e-15 to 1e-14 where a symmetry makes them so, 1e-7 to 1e-5 from errors of steps, 4e-4 and more elsewhere. Ten times
 #: larger, the latter are oriented by their components, not by the branch that they leave.
 _ORTHOGONAL = 1e-4
-#: Relative difference below which two distances are equal, or two eigenvalues, relative to the largest: those of mirror images
-#: differ by 1e-15 to 1e-9.
-_TIE = 1e-6
 
 
 def pivot(vector: Any) -> int:
@@ -109,7 +107,7 @@ def eigenbasis(values: Array, vectors: Array) -> Array:
     >>> eigenbasis(np.array([1.0, 2.0, 2.0]), np.array([[0.0, 0, -1], [0.6, 0.8, 0], [0.8, -0.6, 0]])).round(9).tolist()
     [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
-    apart = np.abs(np.diff(values)) > _TIE * np.abs(values).max(initial=0.0)
+    apart = np.abs(np.diff(values)) > APART * np.abs(values).max(initial=0.0)
     groups = np.split(np.arange(len(values)), np.flatnonzero(apart) + 1)
     rows = [canonical_basis(vectors[group]) if len(group) > 1 else [oriented(vectors[i]) for i in group] for group in groups]
     return np.concatenate(rows).reshape(vectors.shape) + 0.0
@@ -150,4 +148,4 @@ def first_least(values: Sequence[float] | Array) -> int:
     1
     """
     sizes = np.asarray(values)
-    return int(np.argmax(sizes <= (1 + _TIE) * sizes.min()))
+    return int(np.argmax(sizes <= (1 + APART) * sizes.min()))

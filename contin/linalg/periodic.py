@@ -19,17 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.draws import generator
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.levels import ROUND_OFF, TINY
 from contin.linalg.spectrum import fill_eigenvalues
 
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
 #: eigenvalues of a block with such a spread are accurate.
 _APART = 1e4
-#: Below this the coupling of two groups is round-off; at most so many rounds.
-_COUPLED, _ROUNDS = 1e-14, 60
-#: The smallest number of full precision stands for zero in logarithms.
-_TINY = 2.2250738585072014e-308
+#: Rounds of iteration, at most.
+_ROUNDS = 60
 
 
 class Iterates(NamedTuple):
@@ -99,7 +99,7 @@ def product_of(count: int, n: int) -> Product:
 @functools.lru_cache(maxsize=32)
 def _first_basis(n: int) -> Array:
     """Return an orthogonal matrix to start from, always the same."""
-    basis: Array = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0].T)
+    basis: Array = np.ascontiguousarray(np.linalg.qr(generator(__name__).standard_normal((n, n)))[0].T)
     return basis
 
 
@@ -153,7 +153,7 @@ def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
         for a in range(n):
             sizes[a] = 0.0
             for j in range(triangles.shape[0]):
-                sizes[a] += math.log(max(abs(triangles[j, a, a]), _TINY))
+                sizes[a] += math.log(max(abs(triangles[j, a, a]), TINY))
             for b in range(n):
                 coupling[a, b] = 0.0
                 for c in range(n):
@@ -166,7 +166,7 @@ def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
                 for a in range(g, n):
                     for b in range(g):
                         coupled = max(coupled, abs(coupling[a, b]))
-        if coupled < _COUPLED:
+        if coupled < ROUND_OFF:
             break
         for a in range(n):
             for b in range(n):

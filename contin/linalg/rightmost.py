@@ -8,17 +8,19 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import ComplexArray, Function
+from contin.draws import generator
+from contin.levels import CORRECTED, DOUBLED
 
-#: Eigenvalues that each operator gives at first, dimension of the Krylov space for each, restarts, tolerance. Those that
-#: converge late are not wanted: without a bound on restarts, a reaction-diffusion problem takes a hundred times as long.
-_COUNT, _SPACE, _RESTARTS, _TOLERANCE = 12, 4, 12, 1e-11
+#: Eigenvalues that each operator gives at first, and restarts. Those that converge late are not wanted: without a bound on
+#: restarts, a reaction-diffusion problem takes a hundred times as long.
+_COUNT = 12
+#: Dimension of the Krylov space for each eigenvalue.
+_SPACE = 4
 #: Shifts of the Cayley transforms, as multiples of the largest eigenvalue near zero: oscillations with frequencies up to ten
 #: times the largest shift are found.
 _SHIFTS = (1.0, 30.0)
 #: Cayley transforms look right of the line Re z = -_STRIP times the shift.
 _STRIP = 0.2
-#: Two eigenvalues closer than this, relative to 1 + their size, are the same one, found twice.
-_SAME = 1e-7
 
 
 def rightmost(matrix: Any, solver: Function | None = None) -> ComplexArray:
@@ -109,13 +111,13 @@ def nearest_of(inverse: Function, n: int, value: complex) -> complex:
     """Return the same of an operator A that is known by its inverses: ``inverse(s)`` is the function v -> (A - s)^-1 v."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-    start = np.random.default_rng(11).standard_normal(n).astype(complex)
+    start = generator(__name__).standard_normal(n).astype(complex)
     try:
         operator = LinearOperator((n, n), inverse(complex(value)), dtype=complex)
     except RuntimeError:  # exactly singular
         return complex(value)
     try:
-        found = eigs(operator, 1, v0=start, tol=_TOLERANCE, return_eigenvectors=False)
+        found = eigs(operator, 1, v0=start, tol=CORRECTED, return_eigenvectors=False)
     except ArpackError:
         return complex("nan")
     return complex(value + 1 / found[0])
@@ -130,8 +132,8 @@ def _transformed(inverse: Function, n: int, pole: float, zero: float, count: int
     except RuntimeError:  # exactly singular
         return np.empty(0, dtype=complex)
     operator = LinearOperator((n, n), lambda v: v + (pole + zero) * solve(v) if zero else solve(v), dtype=float)
-    start = np.random.default_rng(11).standard_normal(n)
-    options = {"ncv": min(_SPACE * count, n), "maxiter": _RESTARTS, "tol": _TOLERANCE, "return_eigenvectors": False}
+    start = generator(__name__).standard_normal(n)
+    options = {"ncv": min(_SPACE * count, n), "maxiter": _COUNT, "tol": CORRECTED, "return_eigenvectors": False}
     try:
         values: Any = eigs(operator, min(count, n - 2), v0=start, **options)
     except ArpackNoConvergence as error:
@@ -150,7 +152,7 @@ def _distinct(values: ComplexArray) -> ComplexArray:
     upper = values[values.imag >= 0]
     kept: list[complex] = []
     for value in upper[np.argsort(-upper.real, kind="stable")]:
-        if all(abs(value - other) > _SAME * (1 + abs(value)) for other in kept):
+        if all(abs(value - other) > DOUBLED * (1 + abs(value)) for other in kept):
             kept.append(complex(value))
-    pairs = [each for z in kept for each in ((z, z.conjugate()) if z.imag > _SAME * (1 + abs(z)) else (complex(z.real),))]
+    pairs = [each for z in kept for each in ((z, z.conjugate()) if z.imag > DOUBLED * (1 + abs(z)) else (complex(z.real),))]
     return np.array(pairs, dtype=complex)

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 
 from contin.arrays import Array
+from contin.draws import generator
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, helper
 from contin.linalg.factors import Factors
@@ -15,7 +16,7 @@ from contin.linalg.factors import Factors
 @functools.lru_cache(maxsize=8)
 def random_rows(count: int, size: int) -> Array:
     """Return rows to start an iteration from, shape (count, size), always the same: not to be written to."""
-    block = np.random.default_rng(5).standard_normal((count, size))
+    block = generator(__name__).standard_normal((count, size))
     block.flags.writeable = False
     return block
 

@@ -10,17 +10,13 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.draws import PLACES, generator
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.levels import LOCATED
 
 #: An angle's number of rounds is a parameter with this and the name of the angle for a name.
 WINDING = "winding_"
-#: A field is periodic in an angle up to this part of its size: ten times smaller, the round-off of sin(10 phi) would count.
-_EQUAL = 1e-9
-#: Places at which that is checked, with states between -1 and 1 and parameters about their default values.
-_PLACES = 5
-#: Seed of these places.
-_SEED = 11
 
 #: Names of angles, which have the period 2 pi, or names with periods.
 Angles = Sequence[str] | Mapping[str, float]
@@ -109,9 +105,9 @@ def check_periodic(
     ------
     ProblemError
     """
-    names, random = batch.signature.states, np.random.default_rng(_SEED)
-    u = random.uniform(-1, 1, (_PLACES, len(names)))
-    t, none = random.uniform(0, 1, _PLACES), np.empty((0, len(names)))
+    names, random = batch.signature.states, generator(__name__)
+    u = random.uniform(-1, 1, (PLACES, len(names)))
+    t, none = random.uniform(0, 1, PLACES), np.empty((0, len(names)))
     defaults = np.array(list(parameters.values()), dtype=float)
     periods = np.array([angles.get(name, 0.0) for name in names])
     for p in (defaults, defaults + (1 + np.abs(defaults)) * random.uniform(-0.5, 0.5, defaults.size)):
@@ -120,7 +116,7 @@ def check_periodic(
             for name, period in angles.items():
                 gap = batch.values(t, u + period * np.eye(len(names))[names.index(name)], none, p) - here
                 gap = gap - whole_rounds(gap, periods) if lifts else gap
-                wrong = np.abs(gap) > _EQUAL * (1 + np.abs(here).max(axis=1, keepdims=True))
+                wrong = np.abs(gap) > LOCATED * (1 + np.abs(here).max(axis=1, keepdims=True))
                 if np.any(wrong):
                     place, value = np.argwhere(wrong)[0]
                     of_state = f"that of {names[value]}" if gap.shape[1] == len(names) else f"number {value + 1}"

@@ -22,10 +22,8 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.iteration import MOST, root
+from contin.levels import CORRECTED
 from contin.problems.vector_field import combined
-
-#: Singular values of a mass matrix below this part of the largest are zero: matrices are typed, or computed to round-off.
-_ZERO = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +67,7 @@ class Mass:
         if not kept:
             raise ProblemError("mass: it is zero; leave it out and state dynamics=False")
         left, sizes, right = np.linalg.svd(matrix[:, kept])
-        if sizes[-1] <= _ZERO * sizes[0]:
+        if sizes[-1] <= CORRECTED * sizes[0]:
             states = checks.listed(names[i] for i in kept)
             raise ProblemError(f"mass: its columns of {states} depend on each other; take states of which some have no rates")
         if len(found) > MOST:
@@ -77,7 +75,7 @@ class Mass:
         rates = right.T @ (left[:, : len(kept)] / sizes).T
         zero_rows = np.flatnonzero(~matrix.any(axis=1))
         algebraic = np.eye(n)[zero_rows] if len(zero_rows) == len(found) else left[:, len(kept) :].T
-        exact = np.where(np.abs(rates) > _ZERO * np.abs(rates).max(axis=1, keepdims=True), rates, 0.0)
+        exact = np.where(np.abs(rates) > CORRECTED * np.abs(rates).max(axis=1, keepdims=True), rates, 0.0)
         return cls(matrix, kept, found, exact.tolist(), algebraic.tolist())
 
     @property
@@ -133,7 +131,7 @@ class Mass:
         sizes = np.abs(by_found).max(axis=1, keepdims=True)
         by_found = by_found / np.where(sizes > 0, sizes, 1.0)
         values = np.linalg.svd(by_found, compute_uv=False)
-        if not values[-1] > _ZERO * values[0]:
+        if not values[-1] > CORRECTED * values[0]:
             states = checks.listed(names[i] for i in self.found)
             raise ProblemError(
                 f"mass: the equations without rates do not determine {states} at the guess, as their derivatives by these are "

@@ -7,12 +7,10 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.levels import LOCATED
 from contin.names import exact_text
 from contin.problems.statement import declared
 from contin.results.record import Record, over_t
-
-#: Part of a segment by which a coordinate may lie outside: ends are sums of lengths, with their round-off.
-_ROUND_OFF = 1e-9
 
 
 class Profile:
@@ -64,7 +62,7 @@ class Profile:
         """
         places = np.atleast_1d(np.asarray(s, dtype=float))
         t = (places - self.begin) / (self.end - self.begin)
-        outside = ~((t >= -_ROUND_OFF) & (t <= 1 + _ROUND_OFF))
+        outside = ~((t >= -LOCATED) & (t <= 1 + LOCATED))
         if outside.any():
             ends = f"{exact_text(self.begin)} to {exact_text(self.end)}"
             raise ProblemError(f"s: {exact_text(float(places[outside][0]))} must lie on the segment, from {ends}")

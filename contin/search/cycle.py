@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
+from contin.levels import LOCATED
 from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
@@ -22,12 +23,9 @@ from contin.search.solving import solve
 #: A motion that is further off, relative to 1 + where it began, goes to infinity: towards a pole steps of the integrator shrink
 #: without end. Ten times larger, it takes a step or two more.
 _FAR = 1e12
-#: Tolerance of the integration while the motion settles, relative and absolute. With 1e-9 `cycle` takes twice as long.
+#: Tolerance of the integration while the motion settles, relative and absolute. With 1e-9 `cycle` takes twice as long. A motion
+#: smaller than this part of 1 + its largest state is at rest.
 _SETTLES = 1e-6
-#: Tolerance of the integration of the round that is the guess, which Newton's method corrects.
-_ACCURATE = 1e-9
-#: A motion smaller than this part of 1 + its largest state is at rest: that is the tolerance with which it has settled.
-_RESTS = 1e-6
 #: Distance from its start, as a part of the size of the motion, within which it has come back: Newton's method finds the cycle.
 _BACK = 1e-2
 #: Parts of the time in which it settles, in which it must come back: the first ones are enough for most.
@@ -161,7 +159,7 @@ def _forced_rounds(
     """
     period = problem.duration({**values, ROUNDS: 1.0})
     settled = _integrated(field, start[0], period * math.ceil(start[1] / period), _SETTLES).y[:, -1]
-    done = _integrated(field, settled, period * _MOST_ROUNDS, _ACCURATE, dense=True)
+    done = _integrated(field, settled, period * _MOST_ROUNDS, LOCATED, dense=True)
     periods = periods_of(problem)
     size = _size(done.y, periods) or 1.0
     for rounds in range(1, _MOST_ROUNDS + 1):
@@ -194,9 +192,9 @@ def _one_round(field: Field, start: Array, longest: float, periods: Array) -> tu
     """
     across = np.asarray(field(0.0, start), dtype=float)
     for part in _PARTS:
-        done = _integrated(field, start, part * longest, _ACCURATE, dense=True)
+        done = _integrated(field, start, part * longest, LOCATED, dense=True)
         size = _size(done.y, periods)
-        rests = size <= _RESTS * (1 + np.abs(start).max())
+        rests = size <= _SETTLES * (1 + np.abs(start).max())
 
         def height(t: Array, sol: Callable[[Array], Array] = done.sol) -> Array:
             return across @ _apart(sol(t).T, start, periods).T

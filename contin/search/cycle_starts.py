@@ -23,12 +23,11 @@ from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import frequency_of
+from contin.levels import APART
 from contin.problems.angles import windings
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
 
-#: A state of an equilibrium that is smaller than this part of the largest, or than this, may be round-off, and has no size.
-_FAINT = 1e-6
 #: Intervals of the first mesh of a branch from a Hopf point, at least. A run that wants 40 would make its first step on 20 and,
 #: again, on 40: that takes a tenth of a branch of Lorenz's cycles.
 _INTERVALS = 20
@@ -91,10 +90,10 @@ def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[Cy
     Where nothing is far from one it is the same. Sizes that the cycles outgrow are renewed on the way.
     """
     states, names = np.abs(cycles.states(x)).max(axis=0), list(cycles.problem.parameters)
-    states = np.where(states > _FAINT * states.max(), states, 0.0)
+    states = np.where(states > APART * states.max(), states, 0.0)
     parameters = np.ones(len(names))
     parameters[[names.index(name) for name in cycles.free]] = np.abs([cycles.parameter(x, name) for name in cycles.free])
-    sizes = usual(np.where(states > _FAINT, states, 0.0)), usual(np.where(parameters > _FAINT, parameters, 0.0))
+    sizes = usual(np.where(states > APART, states, 0.0)), usual(np.where(parameters > APART, parameters, 0.0))
     if all(np.all(found == 1) for found in sizes):
         return cycles, x
     scaled, x = cycles.with_scales(x, *sizes)

@@ -26,6 +26,7 @@ from contin.core.newton import correct
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
+from contin.levels import LOCATED
 from contin.names import exact_text
 from contin.problems.statement import declared
 from contin.results.point import Point
@@ -45,8 +46,6 @@ _WAVES = 4
 _SIZES = (1.0, 3.0)
 #: Usual draws of each size. With four, one of these 28 searches missed a solution.
 _DRAWS = 8
-#: A point of a branch lies at a value of the parameter that differs by less, relative to 1 + its size: it was located there.
-_AT = 1e-9
 #: Most values, draws and solutions: bounds for what users give.
 _MOST = 100_000
 
@@ -187,7 +186,7 @@ class Site:
 
     def holds(self, point: Point) -> bool:
         """Return whether a point lies at the value."""
-        return self.distance(point) <= _AT * (1 + abs(self.value))
+        return self.distance(point) <= LOCATED * (1 + abs(self.value))
 
     def distance(self, point: Point) -> float:
         """Return how far a point is from the value."""

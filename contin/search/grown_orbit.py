@@ -21,14 +21,11 @@ import numpy as np
 from contin.arrays import Array
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
+from contin.levels import DOUBLED, LOCATED
 from contin.linalg.orientation import oriented
 from contin.problems.angles import periods_of, whole_rounds
 from contin.results.point import Point
 
-#: Distance from the saddle at which an orbit begins, relative to 1 + the states: its square, the error, is round-off.
-_BEGIN = 1e-7
-#: Tolerance of the integration: the orbit is a guess, which Newton's method corrects.
-_ACCURATE = 1e-10
 #: Most steps of the integration: orbits take a few hundred.
 _STEPS = 10_000
 #: Longest time, in units of 1 / the eigenvalue: an orbit that takes longer has gone elsewhere. It takes 16 to leave.
@@ -208,7 +205,7 @@ def _followed(saddle: _Saddle, value: float, guess: Array, direction: int) -> Gr
         The saddle is not found.
     """
     rest, right, left, rate = saddle.at(value, guess)
-    start = rest + direction * _BEGIN * (1 + np.abs(rest).max()) * right / np.abs(right).max()
+    start = rest + direction * DOUBLED * (1 + np.abs(rest).max()) * right / np.abs(right).max()
     found = _until_return(saddle, value, rest, start, _LONGEST / rate)
     if found is None:
         return None
@@ -235,7 +232,7 @@ def _until_return(saddle: _Saddle, value: float, rest: Array, start: Array, long
     def distance(u: Array) -> float:
         return float(np.linalg.norm(saddle.apart(u, rest)))
 
-    solver = LSODA(field, 0.0, start, longest, rtol=_ACCURATE, atol=_ACCURATE)
+    solver = LSODA(field, 0.0, start, longest, rtol=LOCATED, atol=LOCATED)
     times, states, farthest, last = [0.0], [start], 0.0, 1.0
     while solver.status == "running" and len(times) < _STEPS:
         solver.step()

@@ -15,6 +15,7 @@ from contin.boundary.system import Collocation
 from contin.core.system import System
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
+from contin.levels import LOCATED
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.results.point import Point, underlying
@@ -58,7 +59,7 @@ def _over_own_time(problem: Any, guess: Guess, parameters: dict[str, float]) -> 
     begin, time = t[0], t[-1] - t[0]
     ends = states.reshape(t.size, -1)[[0, -1]].ravel().tolist()
     found = dict(zip(problem.ends, ends))
-    if abs(begin) <= _SLACK and abs(time - 1) <= _SLACK:
+    if abs(begin) <= LOCATED and abs(time - 1) <= LOCATED:
         return guess, {**found, **parameters}
     if problem.own_time:
         found[problem.own_time] = float(time)
@@ -163,10 +164,6 @@ def _without_mesh(problem: AlgebraicProblem, guess: Guess, options: Options) -> 
     return system.with_rounds_of(x, options.parameters)
 
 
-#: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
-_SLACK = 1e-9
-
-
 def _on_mesh(problem: BoundaryValueProblem, guess: Guess, options: Options) -> tuple[System, Array]:
     guess = problem.whole_guess(guess, {**problem.parameters, **options.parameters})
     a, b = problem.domain
@@ -175,7 +172,7 @@ def _on_mesh(problem: BoundaryValueProblem, guess: Guess, options: Options) -> t
     if isinstance(guess, Point):
         mesh = _mesh_of(_meshed(guess), order)
     elif _is_pair(guess):
-        given, slack = _numbers(guess[0]), _SLACK * (b - a)
+        given, slack = _numbers(guess[0]), LOCATED * (b - a)
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a + slack or not given[-1] >= b - slack:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
     system = problem.discretized(options.free, options.parameters, None, mesh, options.degree)

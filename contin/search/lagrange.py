@@ -9,6 +9,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.boundary.system import Collocation
 from contin.errors import ProblemError
+from contin.levels import ROUND_OFF
 from contin.problems.statement import multipliers_of
 
 #: Most Gauss-Newton steps: one does where the energy is quadratic in the controls.
@@ -17,8 +18,6 @@ _STEPS = 30
 _HALVINGS = 30
 #: The iteration ends with a step that gains less than this part of the residual: Newton's method goes on from there.
 _SETTLED = 1e-3
-#: Added to the normal equations, relative to their trace: multipliers that nothing determines stay small.
-_LITTLE = 1e-13
 #: The most intervals on which multipliers are looked for: the equations are solved densely. Newton's method does the rest.
 _MOST_INTERVALS = 20
 
@@ -74,7 +73,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
     for _ in range(_STEPS):
         if not np.any(normal):
             break
-        normal[np.diag_indices_from(normal)] += _LITTLE * np.trace(normal)
+        normal[np.diag_indices_from(normal)] += ROUND_OFF * np.trace(normal)
         step = _solved(normal, -gradient, lam.size, (system.degree + 1) * lam.shape[1])
         part = 1.0
         for _ in range(_HALVINGS):

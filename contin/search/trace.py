@@ -18,6 +18,7 @@ from contin.core.settings import Options, Settings, settings_with
 from contin.errors import ConvergenceError, ProblemError, warn
 from contin.events.branch_point import locate_branch_point
 from contin.events.labelled import finding_of
+from contin.levels import APART
 from contin.linalg.orientation import oriented_along
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
@@ -25,9 +26,6 @@ from contin.results.point import Point, underlying
 from contin.search.connection_starts import from_non_central, leaves_saddle_node
 from contin.search.cycle_starts import switched, switches
 from contin.search.field_starts import begins_oscillations, oscillation
-
-#: A branch point lies no further from where folds meet it, relative to 1 + its size: both are located to 1e-9 or better.
-_HERE = 1e-5
 
 
 @checks.arguments
@@ -156,7 +154,7 @@ def _solution(start: Point, free: Sequence[str] | None) -> tuple[Point, tuple[st
         point = locate_branch_point(system, x)
     except ConvergenceError:
         return found, names
-    if not np.abs(point.x - x).max() < _HERE * (1 + np.abs(x).max()):
+    if not np.abs(point.x - x).max() < APART * (1 + np.abs(x).max()):
         return found, names  # as at a fold in the other parameter
     return dataclasses.replace(found, label=Label.BRANCH_POINT, x=point.x, details=point), names
 

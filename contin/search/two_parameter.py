@@ -23,6 +23,7 @@ from contin.defining.extremum_curve import ExtremumCurve
 from contin.defining.fold_curve import FoldCurve
 from contin.defining.system import Defining
 from contin.errors import ProblemError
+from contin.levels import APART
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.search.codimension_two import leaving
@@ -186,7 +187,7 @@ def _on_curve(start: Point, base: Any, x: Array) -> _First | None:
 
 def _is_at_a_value(start: Point) -> bool:
     """Return whether a column has the value that the point was located for."""
-    return start.value is not None and abs(start[start.column] - start.value) <= _LOCATED * (1 + abs(start.value))
+    return start.value is not None and abs(start[start.column] - start.value) <= APART * (1 + abs(start.value))
 
 
 def _holding(start: Point, column: str) -> Point:
@@ -233,15 +234,13 @@ def _event(start: Point, base: System, x: Array, event: Event) -> _First:
     """
     found = EventCurve(base, event)
     here, slope = found.value(x), found.own_gradients(x)[0]
-    if not abs(here) <= _LOCATED * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
+    if not abs(here) <= APART * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
         raise ProblemError(f"event: {event.name!r} is {here:.6g} at the start; it must be the function that labelled it")
     if not found.is_confirmed(x):
         raise ProblemError(f"event: confirm of {event.name!r} returns False at the start; it must be the one that labelled it")
     return found, x
 
 
-#: A value at a located point differs from the one that was looked for by less than this, relative to 1 + its size.
-_LOCATED = 1e-6
 #: What a start may be, in words.
 _STARTS = (
     "one of LP, BP, HB (of equilibria), PD, TR, EX, a special point of homoclinic orbits, or one where a column has a value "

@@ -1,0 +1,34 @@
+"""Random numbers, and places to compare functions at: the same ones in every run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contin.arrays import Array
+
+#: Draws of round-off: numbers are computed again with random signs of a unit in the last place. The largest change of three is
+#: seldom below half of what is usual, and at least half of that of ten.
+DRAWS = 3
+#: Places at which functions are compared. Functions that differ agree at none of them; with fewer than three, null vectors that
+#: differ by a thousandth passed for the same.
+PLACES = 5
+#: Distance of a place beside a point, relative to 1 + |x|: far enough that what vanishes at the point does not there. Ten times
+#: nearer, null vectors that turn slowly would count as fixed; ten times further, places are outside of the domain of equations.
+ASIDE = 0.1
+
+
+def generator(name: str) -> np.random.Generator:
+    """Return a generator of random numbers, the same ones for a name (that of the module), so that runs repeat bit for bit."""
+    return np.random.default_rng([*name.encode()])
+
+
+def signs(random: np.random.Generator, like: Array) -> Array:
+    """Return random signs, of the shape of an array."""
+    found: Array = random.choice((-1.0, 1.0), like.shape)
+    return found
+
+
+def rounded(random: np.random.Generator, x: Array) -> Array:
+    """Return numbers moved up or down by one unit in the last place."""
+    moved: Array = x * (1 + np.finfo(float).eps * signs(random, x))
+    return moved
