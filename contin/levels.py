@@ -21,7 +21,7 @@ ROUND_OFF = 1e-14
 CORRECTED = 1e-12
 #: A singular value, or an eigenvalue of a symmetric matrix, is zero below this part of the largest: vectors depend on each
 #: other. Round-off leaves 1e-14, times the condition number of what was eliminated; slow branches near their birth have 1e-8.
-SINGULAR = 1e-10
+DEPENDENT = 1e-10
 #: What is typed, located or integrated, and all that is computed from it: symmetries typed to ten digits, sums of lengths, the
 #: multiplier 1 of a conservative system (the mesh moves it by 1e-10), multipliers of symmetries (1e-11), rates of a component.
 #: Ten times larger, a neutral saddle is known to 1e-8 only, matrices typed with eight digits pass for symmetries, and a cycle
@@ -39,3 +39,12 @@ APART = 1e-6
 #: small by chance once in 5,000 times. Ten times larger, branches of length 1e-10 would not end, and errors of 1e-10 would pass
 #: where Newton's method leaves 1e-12.
 CERTAIN = 10.0
+
+# Counts of iterations, at most: an iteration that converges takes fewer.
+
+#: Updates of Newton's method or of a secant method that begin near by: four to six do. What has not converged then will not.
+MOST_UPDATES = 20
+#: Halvings of an interval, or steps that divide it as well: then its ends are neighbouring numbers.
+MOST_HALVINGS = 60
+#: Steps of an iteration that begins far away: ten times those of one that converges.
+MOST_STEPS = 100

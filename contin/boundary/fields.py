@@ -39,7 +39,7 @@ from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import at_special_point
-from contin.levels import LOCATED, SINGULAR
+from contin.levels import DEPENDENT, LOCATED
 from contin.linalg.rightmost import nearest_of, rightmost_of
 
 #: Most rates at Gauss points for which T is formed: its eigenvalues take half a second then. Arnoldi's method takes 0.15 s of
@@ -130,7 +130,7 @@ class Fields(Spectral, Collocation):
                 values = np.linalg.eigvals(inverse(pencil.shift)(np.eye(count)))
             except RuntimeError:  # no shift has an inverse
                 return np.full(2, np.nan, dtype=complex)
-            finite = values[np.abs(values) > SINGULAR * np.abs(values).max(initial=0.0)]
+            finite = values[np.abs(values) > DEPENDENT * np.abs(values).max(initial=0.0)]
             found = pencil.shift + 1 / finite
         found = found[np.lexsort((-found.imag, -found.real))]
         kept = max(_KEPT, 2 + int(np.count_nonzero(found.real > 0)))

@@ -37,7 +37,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
-from contin.levels import SINGULAR
+from contin.levels import DEPENDENT
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -154,7 +154,7 @@ def _convexity(hll: Array) -> float:
         return np.nan
     values = np.linalg.eigvalsh((hll + hll.swapaxes(1, 2)) / 2)
     largest = np.abs(values).max(axis=1)
-    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + SINGULAR if np.all(largest > 0) else -1.0
+    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + DEPENDENT if np.all(largest > 0) else -1.0
 
 
 class Undetermined(StrEnum):
@@ -193,7 +193,7 @@ def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
     if found is None:
         return "energy: it is not convex in the controls there (Legendre's condition)"
     sizes = np.abs(found.eigenvalues)
-    if sizes.size and not sizes.min() > SINGULAR * sizes.max():
+    if sizes.size and not sizes.min() > DEPENDENT * sizes.max():
         return Undetermined.MODE
     return ""
 
@@ -370,11 +370,11 @@ def _roots(hll: Array) -> tuple[Array, Array] | None:
     if not np.isfinite(values).all():
         return None
     largest = values.max(axis=2)
-    if np.any(values < -SINGULAR * largest[:, :, None]) or np.any(largest <= 0):
+    if np.any(values < -DEPENDENT * largest[:, :, None]) or np.any(largest <= 0):
         return None
-    k = int(np.max(np.count_nonzero(values > SINGULAR * largest[:, :, None], axis=2)))
+    k = int(np.max(np.count_nonzero(values > DEPENDENT * largest[:, :, None], axis=2)))
     values, vectors = values[:, :, -k:], vectors[:, :, :, -k:]
-    root = np.sqrt(np.maximum(values, SINGULAR * largest[:, :, None]))
+    root = np.sqrt(np.maximum(values, DEPENDENT * largest[:, :, None]))
     return vectors * root[:, :, None], vectors / root[:, :, None]
 
 
@@ -458,7 +458,7 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Arr
     free = np.eye(size)
     if len(rows):
         _, singular, vectors = np.linalg.svd(rows)
-        if singular[-1] < SINGULAR * singular[0]:
+        if singular[-1] < DEPENDENT * singular[0]:
             raise ProblemError(Undetermined.CONDITIONS)
         free = vectors[len(rows) :].T
     values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)

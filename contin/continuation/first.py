@@ -20,20 +20,13 @@ from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.accuracy import accuracy_of
 from contin.events.significance import growing
+from contin.levels import APART, LOCATED
 from contin.names import value_names
 
-#: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
-_SLACK = 1e-9
-#: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
-#: 1e-10 is then told from round-off, and no regular start lies so near to an end.
-_ENTERS = 1e-6
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 3
 #: Finer and finer meshes that are tried.
 _ATTEMPTS = 4
-#: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected
-#: point is a thousandth of a usual first step away.
-_BESIDE = 1e-6
 
 
 def on_branch(system: Discretization, x: Array, tangent: Array, settings: Settings, singular: bool) -> State:
@@ -113,7 +106,7 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
     fixed[system.parameter_index(primary)] = 1.0
     across = generator(__name__).standard_normal(system.size) * np.sqrt(system.weights)
     failed: ConvergenceError | None = None
-    beside = x + _BESIDE * across / np.abs(across).max()  # of a branch point, where both are singular
+    beside = x + APART * across / np.abs(across).max()  # of a branch point, where both are singular
     for start, row in ((x, fixed), (x, across), (beside, across)):
         try:
             return correct(system, start, row, row @ start, newton, sizes=system.magnitudes).x, row
@@ -131,10 +124,10 @@ def begins_outside(trial: Trial, settings: Settings, own: Sequence[Event], singu
     """
     for name, (low, high) in settings.limits.items():
         size = min(1.0, high - low)
-        if not low - _SLACK * (size + abs(low)) <= trial[name] <= high + _SLACK * (size + abs(high)):
+        if not low - LOCATED * (size + abs(low)) <= trial[name] <= high + LOCATED * (size + abs(high)):
             ends = " ... ".join(value_names((low, high)).values())
             return Stop(Reason.LIMIT, f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
-    beside = Trial.without_tangent(trial.system, trial.x + _ENTERS * trial.tangent)
+    beside = Trial.without_tangent(trial.system, trial.x + APART * trial.tangent)
     for test in own:
         if test.terminal and trial.value(test) < 0 and (singular or not test.function(beside) > 0):
             return Stop(Reason.EVENT, f"{test.name} at the first point")

@@ -17,7 +17,6 @@ from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
 from contin.core.newton import STAGNANT
-from contin.core.rounding import NEAR_CIRCLE
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import COLLAPSED
 from contin.events.crossings import TURN
@@ -25,6 +24,7 @@ from contin.events.nearness import AS_FAR
 from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.levels import APART
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends
 
@@ -158,7 +158,7 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: 
         x, y = room.real[a], room.imaginary[a]
         if a == trivial:
             continue
-        if not abs(x) >= NEAR_CIRCLE or not math.hypot(x, y) > AS_FAR * least:
+        if not abs(x) >= APART or not math.hypot(x, y) > AS_FAR * least:
             return ASK
         spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
         at += 1

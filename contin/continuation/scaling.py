@@ -36,6 +36,7 @@ from contin.core.settings import Settings
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
 from contin.events.significance import on_finer_mesh
+from contin.levels import APART, CORRECTED, DOUBLED
 from contin.problems.statement import declared
 
 #: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
@@ -48,24 +49,12 @@ _SETTLED = 1e-3
 _FEWEST = 4
 #: Largest Krylov space that parts close eigenvalues: those that differ by a tenth. Twice as many part some that differ by 1e-2.
 _KRYLOV = 12
-#: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
-_NILPOTENT = 1e-6
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
 #: close; at .5 what it leaves of others counts as their size.
 _LASTS = 0.1
-#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the
-#: finite time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the larger size.
-_NOTHING = 1e-8
-#: A parameter that changes less than this while the branch goes on by one stands still: a fold. Ten times larger, a parameter
-#: of that unit must have its size stated.
-_STILL = 1e-12
 #: A size that only a null vector gives is a guess on the side of small ones: above this it is one. Guesses of 1e-3 to 8e-3
 #: make a branch of configs/open_shear.yaml so long that its points do not do.
 _FAR = 9e-4
-#: One below this part of the largest is round-off that passed as part of the vector: 2e-14 under one of OpenBLAS's kernels.
-_FAINT = 1e-11
-#: Round-off is told by what changes where everything is computed again, so many times at most, ...
-_DRAWS = 3
 #: ... and once where that is below this part of what was found. Of single numbers two that are nothing but round-off agree to a
 #: thirtieth in one case of fifty: under one of OpenBLAS's kernels an arch had a multiplier of size 1e-16, and did not move.
 _CLEAR = 1e4
@@ -139,7 +128,7 @@ class _FirstPoint:
         """Return whether the primary parameter stands still while states go on: by itself, and relative to all values."""
         value, moving = abs(self.x[self.place]), (self.x != 0) & (self.linear.tangent != 0)
         fastest = np.max(np.abs(self.linear.tangent[moving] / self.x[moving]), initial=0.0)
-        return bool(abs(rate) <= _STILL and abs(rate) <= _STILL * fastest * value)
+        return bool(abs(rate) <= CORRECTED and abs(rate) <= CORRECTED * fastest * value)
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:
@@ -149,7 +138,7 @@ class _FirstPoint:
         known = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
         self.tangent = self._kept(self.tangent, self.system.largest(self.tangent) > error_of_tangent)
         if not self.tangent.any():  # a fold: sizes that are small are known on the branch that led here
-            return np.where((known > _NOTHING) | (stated > 0), known, 0.0)
+            return np.where((known > DOUBLED) | (stated > 0), known, 0.0)
         own = type(self.system).along is not Discretization.along  # a kind of system of others has differences
         if not own or any(batch.interpreted is not None for batch in self.system._evaluated):
             return known  # differences are taken over lengths of order one: they show no other sizes
@@ -158,7 +147,7 @@ class _FirstPoint:
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
         small = (known > 0) & (known < USUAL[0]) & ~at
-        bends = np.where(at | (small & ~(known > _NOTHING * self._alone(small))), 0.0, known)
+        bends = np.where(at | (small & ~(known > DOUBLED * self._alone(small))), 0.0, known)
         reach = min(_held(reach, terms[0], np.where(at, 0.0, known)), _bent(terms, bends))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
@@ -178,7 +167,7 @@ class _FirstPoint:
         apart = self._apart(small)
         found = np.where(small & ~_counts(found, apart), apart, found)
         guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
-        nothing = found < _FAINT * np.max(found[guessed], initial=0.0)
+        nothing = found < CORRECTED * np.max(found[guessed], initial=0.0)
         return np.where(guessed & ((found > _FAR) | nothing), np.where(nothing, 0.0, np.maximum(found, 1.0)), found)
 
     def _beside(self, number: int) -> tuple[Array, Any, float]:
@@ -192,7 +181,7 @@ class _FirstPoint:
             self._others.append((x, self.system.linearize(x, (self.row,))[1], 1 + self._random.random()))
         return self._others[number]
 
-    def _error(self, found: Array, again: Callable[[int], Array], draws: int = _DRAWS) -> Array:
+    def _error(self, found: Array, again: Callable[[int], Array], draws: int = draws.DRAWS) -> Array:
         """Return the round-off of what was found, by name, from computing it again; more often where it may be all there is."""
         size, error = self.system.largest(found), np.zeros(1)
         for number in range(draws):
@@ -208,7 +197,7 @@ class _FirstPoint:
             columns = self.system.parameter_columns(self.x, names).T
             changes = self._factors.solve(np.hstack([columns, np.zeros((len(names), 1))]))
         return {name for name, change in zip(names, changes)
-                if np.any(values[name] * self.system.largest(change) > _NOTHING * sizes)}  # fmt: skip
+                if np.any(values[name] * self.system.largest(change) > DOUBLED * sizes)}  # fmt: skip
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
@@ -218,7 +207,7 @@ class _FirstPoint:
         for order in (2, 3):
             yield self._solved([self.tangent] * order) / math.factorial(order)
 
-    def _solved(self, directions: Sequence[Array], draws: int = _DRAWS) -> Array:
+    def _solved(self, directions: Sequence[Array], draws: int = draws.DRAWS) -> Array:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
 
         def again(number: int) -> Array:
@@ -279,7 +268,7 @@ class _FirstPoint:
             if growth[-1] > 0:
                 rate = float(np.exp(np.mean(np.log(growth[-4:]))))
                 nearer = found is None or rate ** (-1 / order) < found.distance
-                if rate > _NILPOTENT * max(growth[2:]) and nearer:
+                if rate > APART * max(growth[2:]) and nearer:
                     found = self._mode(v, direction, rate, order)
         return found
 
@@ -319,7 +308,7 @@ class _FirstPoint:
                 image = image - shares @ np.array(basis)
                 matrix[: len(basis), place] += shares
             matrix[place + 1, place] = np.linalg.norm(image)
-            if not matrix[place + 1, place] > _NOTHING * size:
+            if not matrix[place + 1, place] > DOUBLED * size:
                 break
             basis.append(image / matrix[place + 1, place])
         count = place + 1
@@ -386,7 +375,7 @@ class _FirstPoint:
             left = self._kept(self._changed(left, self.tangent, mode.order) / mode.rate, mine)
             sizes.append(float(np.linalg.norm(left)))
         size = sizes[-1]
-        return float(np.linalg.norm(mode.vector)) / size if size > _NOTHING * np.linalg.norm(term) else np.inf
+        return float(np.linalg.norm(mode.vector)) / size if size > DOUBLED * np.linalg.norm(term) else np.inf
 
     # --- errors --------------------------------------------------------------------------------------------------
 
@@ -488,7 +477,7 @@ def _larger(sizes: Array, others: Array, where: Pattern, error: Array) -> Array:
 
 def _counts(values: Array, natural: Array) -> Pattern:
     """Return which values are more than nothing, compared with the sizes that the expansion gives."""
-    found: Pattern = (values >= USUAL[0]) | (values > _NOTHING * natural)
+    found: Pattern = (values >= USUAL[0]) | (values > DOUBLED * natural)
     return found
 
 

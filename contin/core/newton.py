@@ -32,10 +32,10 @@ from contin.collocation.one_call import (
 from contin.collocation.workspace import Workspace
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError
+from contin.levels import CORRECTED, LOCATED, MOST_STEPS
 from contin.linalg.condensation import Factorization
 from contin.linalg.convergence import (
     CHORDS,
-    ROUND_OFF,
     diverges,
     estimated_rate,
     has_converged,
@@ -222,7 +222,7 @@ def _newton(
             if not math.isfinite(size):
                 break
             progress.record(size, fresh)
-            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, ROUND_OFF)):
+            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, LOCATED)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
                     return Corrected(x, factors, len(progress.sizes), progress.error)
@@ -275,6 +275,29 @@ def _relative(update: Array, sizes: Array) -> float:
     return float(np.max(np.abs(update[moving]) / sizes[moving], initial=0.0))
 
 
+def nearest_zero(linearized: Callable[[Array], tuple[Array, Array]], x: Array) -> Array | None:
+    """Return the zero of a few equations that Newton's method finds near x, to round-off; None where it finds none.
+
+    ``linearized(x)`` returns the values and their matrix of derivatives. Of more unknowns than equations, updates are the
+    smallest.
+
+    Examples
+    --------
+    >>> root = nearest_zero(lambda x: (x * x - 2, 2 * x[:, None]), np.array([1.0]))
+    >>> print(root.round(12))
+    [1.414213562373]
+    """
+    for _ in range(MOST_UPDATES):
+        values, matrix = linearized(x)
+        if not (np.isfinite(values).all() and np.isfinite(matrix).all()):
+            return None
+        update = np.linalg.lstsq(matrix, -values)[0]
+        x = x + update
+        if np.abs(update).max() <= CORRECTED * (1 + np.abs(x).max()):
+            return x
+    return None
+
+
 def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Array]:
     """Return points from which Newton's method may converge, reached from a guess by damped steps, each nearer than the last.
 
@@ -285,7 +308,7 @@ def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Ar
     for enough in _ENOUGH:
         x, near = np.array(guess, dtype=float), _NEAR
         with np.errstate(all="ignore"):
-            for _ in range(_MOST_DAMPED):
+            for _ in range(MOST_STEPS):
                 update, factors = _correction(system, x)
                 size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
                 if size < near:
@@ -316,9 +339,9 @@ def _part_taken(system: Equations, x: Array, update: Array, factors: Factors, en
 #: A step must make the next correction smaller by this part, times the part of the correction that it takes: first as theory
 #: suggests, then about as SciPy's solve_bvp asks. A hanging cable needs the first, a localized pattern the second.
 _ENOUGH = (0.5, 0.2)
-#: Damped steps end where corrections, relative to 1 + |x|, are so small: Newton's method takes over. They end, too, after so
-#: many steps, and with so small a part of the correction.
-_NEAR, _MOST_DAMPED, _LEAST_PART = 1e-2, 100, 1e-4
+#: Damped steps end where corrections, relative to 1 + |x|, are so small: Newton's method takes over. They end, too, with so
+#: small a part of the correction.
+_NEAR, _LEAST_PART = 1e-2, 1e-4
 
 
 def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...], coarse: float) -> bool:

@@ -13,22 +13,7 @@ import numpy as np
 
 from contin import draws
 from contin.arrays import Array, ComplexArray, Mask
-
-#: Round-off of a multiplier is looked at where the real part of its logarithm is smaller. In the restricted three-body problem
-#: it is 1e-10, and 4e-7 for a double multiplier one. Ten times larger, it is looked at along more of a branch for nothing.
-NEAR_CIRCLE = 1e-6
-#: That of an eigenvalue, where its real part is below this part of the largest eigenvalue: it is 1e-15 in chains of masses.
-#: Ten times larger, it is looked at for nothing where a matrix has eigenvalues of very different size.
-NEAR_AXIS = 1e-9
-#: Round-off of a number, relative to 1 + its size: a parameter that differs by no more is the same at two points, and no error
-#: is given as less. It is 16 units in the last place, as sums over a mesh lose a digit.
-LAST_PLACES = 16 * float(np.finfo(float).eps)
-#: A real part is zero if it is below so many times the largest change. With three draws the change is a tenth of the round-off
-#: by chance once in 5,000 times.
-_CERTAIN = 10.0
-#: That of the logarithm of a multiplier is zero below this, too. Where a pair passes the circle is located with what is
-#: computed.
-_ON_CIRCLE = 1e-12
+from contin.levels import APART, CERTAIN, CORRECTED, LOCATED
 
 
 def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: ComplexArray, full: float = math.inf) -> Array:
@@ -55,19 +40,19 @@ def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: Co
 
     Where no more than ``expected`` come near it, these are not looked at.
     """
-    near = np.abs(values.real) < NEAR_CIRCLE
+    near = np.abs(values.real) < APART
     if np.count_nonzero(near) <= expected:
         return np.zeros(len(values), dtype=bool)
-    bound = np.full(len(values), _ON_CIRCLE)
-    if np.any(near & (np.abs(values.real) > _ON_CIRCLE)):
-        bound = np.maximum(bound, _CERTAIN * changes_of_multipliers(eigenvalues, x, values))
+    bound = np.full(len(values), CORRECTED)
+    if np.any(near & (np.abs(values.real) > CORRECTED)):
+        bound = np.maximum(bound, CERTAIN * changes_of_multipliers(eigenvalues, x, values))
     return near & (np.abs(values.real) <= bound)
 
 
 def may_be_on_axis(values: ComplexArray) -> Mask:
     """Return which eigenvalues are complex and so near to the axis that round-off decides; of matrices, shape (..., n)."""
     sizes = np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
-    near: Mask = (np.abs(values.real) < NEAR_AXIS * sizes) & (values.imag != 0) & (values.real != 0)
+    near: Mask = (np.abs(values.real) < LOCATED * sizes) & (values.imag != 0) & (values.real != 0)
     return near
 
 
@@ -77,4 +62,4 @@ def off_axis(eigenvalues: Callable[[Array], ComplexArray], matrix: Array, values
     if not near.any():
         return values
     error = changes(lambda signs: eigenvalues(matrix * (1 + np.finfo(float).eps * signs(matrix))), values)
-    return np.where(near & (np.abs(values.real) <= _CERTAIN * error), 1j * values.imag, values)
+    return np.where(near & (np.abs(values.real) <= CERTAIN * error), 1j * values.imag, values)

@@ -14,14 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.arrays import Array
+from contin.draws import ASIDE
 
 #: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
 #: numbers, and small ones less.
 USUAL = 1e-2, 1e3
-
-#: The largest entries of rows are looked at beside a point, too, by this part of 1 + |x|, in sizes. At a branch point all those
-#: of a row may be zero but for round-off: with rows of 1e-29 a branch of the equation of Kuramoto and Sivashinsky ended.
-_ASIDE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +58,7 @@ def largest_entries(entries: Callable[[Array], Array], x: Array) -> Array:
     """Return the larger of ``entries(x)`` and of those beside x, where these are finite."""
     here = entries(x)
     with np.errstate(all="ignore"):
-        beside = entries(x + _ASIDE * (1 + np.abs(x)))
+        beside = entries(x + ASIDE * (1 + np.abs(x)))
     larger: Array = np.maximum(here, np.where(np.isfinite(beside), beside, 0.0))
     return larger
 

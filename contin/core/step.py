@@ -22,6 +22,7 @@ from contin.core.trial import Linearization, Trial, linearization, linearization
 from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import ReadOnlyVector, Vector, helper
+from contin.levels import APART, CORRECTED, TINY
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 
@@ -47,15 +48,8 @@ _MISSED = 0.75
 #: parameter makes the norm they could miss it by all of their size: of 600 runs of a reactor whose residence time goes to 500,
 #: 152 jumped over a fold to another branch, 11 with this; 17 with 5, with 4 % fewer points.
 _LOOSE = 4.0
-#: States that miss their prediction by less, in their sizes, are not compared: it may be round-off.
-_SMALL = 1e-6
-#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
-#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
-_NOISE = 1e-12
 #: Numbers that `fill_sums` fills.
 SUMS = 7
-#: Smallest angle and rate, in place of zero where they are divided by.
-_NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
 
 def aims(settings: Settings, system: Discretization) -> tuple[float, float]:
@@ -192,9 +186,9 @@ def missed_of(missed: float, of_states: float, first: float, last: float) -> flo
 
     States that go slowly beside a parameter are compared with their own rate, at the end of the step where it is larger.
     """
-    if of_states <= _SMALL * _SMALL:
+    if of_states <= APART * APART:
         return math.sqrt(missed)
-    return math.sqrt(max(missed, of_states / (_LOOSE * _LOOSE * max(first, last) + _NO_RATE)))
+    return math.sqrt(max(missed, of_states / (_LOOSE * _LOOSE * max(first, last) + TINY)))
 
 
 @helper
@@ -203,13 +197,13 @@ def is_astray(missed: float, change: float, error: float, value: float) -> bool:
 
     ``error`` is that of Newton's method, ``value`` the parameter.
     """
-    return missed > _MISSED * change and missed > (_NOISE + 2 * error) * (1 + abs(value))
+    return missed > _MISSED * change and missed > (CORRECTED + 2 * error) * (1 + abs(value))
 
 
 @helper
 def longest_step(longest: float, change: float, value: float, rate: float) -> float:
     """Return the longest step, shortened so that a parameter changes by no more than this part of 1 + its size."""
-    return min(longest, change * (1 + abs(value)) / (abs(rate) + _NO_RATE))
+    return min(longest, change * (1 + abs(value)) / (abs(rate) + TINY))
 
 
 @helper
@@ -218,7 +212,7 @@ def following_step(
 ) -> float:
     """Return the next step: one whose prediction, with an error of this order, misses ``accuracy`` of it."""
     factor = _LONGER if missed == 0 else (accuracy * step / missed) ** (1 / order)
-    factor = min(factor, _AIM * angle / max(turn, _NO_ANGLE))
+    factor = min(factor, _AIM * angle / max(turn, CORRECTED))
     return min(max(step * min(max(factor, _SHORTER), _LONGER), shortest), max(longest, shortest))
 
 

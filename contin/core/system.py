@@ -17,6 +17,7 @@ from contin.core.protocol import Carrier, Discretization
 from contin.core.scales import Scales, nothing_scaled
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.levels import LAST_PLACES
 from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
 
@@ -203,7 +204,7 @@ class System(Discretization):
         for batch in batches:
             batch.error = 0.0
         found = function()
-        error = max([_ROUND_OFF, *(batch.error for batch in batches)])
+        error = max([LAST_PLACES, *(batch.error for batch in batches)])
         for batch, known in zip(batches, before):
             batch.error = max(batch.error, known)
         return found, error
@@ -243,7 +244,3 @@ class System(Discretization):
     @abstractmethod
     def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
         """Return the same problem with other free parameters (values from x), and x for it."""
-
-
-#: Round-off of derivatives that are exact, relative to the sum of the absolute values of their terms.
-_ROUND_OFF = 1e-15

@@ -30,12 +30,10 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.interpolated import meeting
 from contin.events.normal_forms import coefficient, flip, pair
+from contin.levels import APART
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
-#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
-#: they are located more exactly than that.
-_REAL = 1e-6
 #: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
 _NEAR = 0.05
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
@@ -117,7 +115,7 @@ class TorusCurve(MultiplierCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
-        if self.is_long or self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL:
+        if self.is_long or self.imaginary_part(x) < APART or abs(self.kappa(x) - RESONANCES["R3"]) < APART:
             return UNKNOWN
         return coefficient(self.base, self.inside(x), pair, self.frequency(x))
 

@@ -23,6 +23,7 @@ from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Columns
+from contin.levels import APART, DOUBLED, LOCATED
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks
@@ -31,25 +32,18 @@ from contin.linalg.transitions import interval_matrices
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.own_names import PERIOD, rounds_of
 
-#: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
-#: square root.
-_OPPOSITE = 1e-6
 #: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
 _SPLIT = 100.0
 #: Multipliers of so many orbits are kept.
 _KEPT = 50
-#: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
-_SHRUNK = 1e-7
 #: Share of the period's relative change in the length of a step: weight of (change of T)^2 / (1 + T)^2. With 1 in place of it
 #: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
 #: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
 _PERIOD_SHARE = 0.1
-#: The reference is renewed where an orbit differs from it by more than this part of its size.
-_MOVED = 1e-6
 
 
-#: Free parameters are multiplied by this to see whether a break of the forcing moves; it stands still within so much.
-_OTHERWISE, _STILL = 1.01, 1e-9
+#: Free parameters are multiplied by this to see whether a break of the forcing moves.
+_OTHERWISE = 1.01
 
 
 class PeriodicEquations(Collocation):
@@ -110,7 +104,7 @@ class PeriodicEquations(Collocation):
         states = states if half is None else states @ half.T
         apart = states - later
         apart = apart - whole_rounds(apart, periods_of(self.problem))
-        return bool(np.all(np.abs(apart).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+        return bool(np.all(np.abs(apart).max(axis=0) <= DOUBLED * (1 + np.abs(states).max(axis=0))))
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x, beyond the unit interval by the symmetry, without gains."""
@@ -349,7 +343,7 @@ class ForcedEquations(PeriodicEquations):
         moved = self.parameters.copy()
         moved[self._free] *= _OTHERWISE
         here, there = (breaks_of(self.problem.batch("field"), self.problem.domain, p) for p in (self.parameters, moved))
-        still = np.abs(here[:, None] - there) <= _STILL if there.size else np.zeros((here.size, 1), dtype=bool)
+        still = np.abs(here[:, None] - there) <= LOCATED if there.size else np.zeros((here.size, 1), dtype=bool)
         found: Array = here[still.any(axis=1)]
         return found
 
@@ -463,7 +457,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""
         states = self._scaled_states(x)
-        return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+        return bool(np.all(np.ptp(states, axis=0) <= DOUBLED * (1 + np.abs(states).max(axis=0))))
 
     def amplitude(self, x: Array) -> float:
         """Return the size of an orbit: the root mean square without its mean, as far as it lies along the reference.
@@ -536,7 +530,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
         mesh, states = self._better_mesh(x, control), self.states(x)
-        if mesh is None and np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
+        if mesh is None and np.abs(states - self.reference).max() <= APART * np.abs(states).max():
             return None
         other = self._referring_to(states)
         return (other, np.array) if mesh is None else other.on_mesh(mesh)
@@ -558,7 +552,7 @@ def _gains(once: Array, symmetry: Array, order: int) -> Array:
 
 def is_opposite(frequency: float) -> bool:
     """Return whether a multiplier with this angle is -1, up to round-off."""
-    return abs(frequency - math.pi) < _OPPOSITE
+    return abs(frequency - math.pi) < APART
 
 
 def is_pair(values: ComplexArray) -> Mask:

@@ -36,13 +36,11 @@ from contin.events.normal_forms import flip, pair
 from contin.events.refinement import ASIDE
 from contin.events.significance import on_finer_mesh
 from contin.events.zeros import separated
+from contin.levels import LOCATED
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
 _ONE = 1e-5
-#: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
-#: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
-_NEARLY_ONE = 1e-9
 #: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
 #: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
@@ -152,7 +150,7 @@ def _trivial(system: PeriodicEquations | MapEquations, x: Array) -> int | None:
     return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
 
 
-def unstable(system: PeriodicEquations | MapEquations, x: Array, least: float = _NEARLY_ONE) -> int:
+def unstable(system: PeriodicEquations | MapEquations, x: Array, least: float = LOCATED) -> int:
     """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
 
     Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:

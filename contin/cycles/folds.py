@@ -11,11 +11,7 @@ from contin.cycles.curves import NORMAL, normal_product
 from contin.cycles.equations import PeriodicEquations
 from contin.cycles.map_equations import MapEquations
 from contin.defining.critical_curve import signed_smallest
-
-#: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
-_REAL = 1e-12
-#: `NORMAL` of cycles of maps, without a mesh: a point is located to this part of the way on which the cosine is of order one.
-_NORMAL_OF_MAPS = 1e-14
+from contin.levels import CORRECTED, ROUND_OFF
 
 
 def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
@@ -23,7 +19,7 @@ def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
 
     The change of g with the multiplier vanishes where a further one is one.
     """
-    autonomous, noise = cycles.autonomous, NORMAL if cycles.intervals else _NORMAL_OF_MAPS
+    autonomous, noise = cycles.autonomous, NORMAL if cycles.intervals else ROUND_OFF
     critical = 1 + autonomous
 
     def further(trial: Trial) -> float:
@@ -38,7 +34,7 @@ def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
         others = exponents[np.argsort(np.abs(exponents))[critical:]]
         size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
         multipliers = np.exp(others - size)
-        multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
+        multipliers.imag[np.abs(multipliers.imag) <= CORRECTED * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
     return [Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]

@@ -16,11 +16,12 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
-from contin.core.newton import correct
+from contin.core.newton import correct, nearest_zero
 from contin.core.state import Stop
 from contin.core.trial import Event, Trial, linearization
 from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
+from contin.levels import APART, CORRECTED
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
@@ -35,13 +36,6 @@ _SLOW = 0.05
 _NEAR = 0.1
 #: ... which counts where that takes at least this part of the period.
 _MOSTLY = 0.5
-#: A coordinate of the equilibrium below this part of the cycle's size is zero: round-off of Newton's method.
-_NOTHING = 1e-13
-#: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
-_UPDATES, _CONVERGED = 30, 1e-10
-#: A saddle-node lies within this distance in the parameter, relative to 1 + that, where the least speed of a cycle beside it is
-#: below `STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
-_BESIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +110,11 @@ def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, Complex
     """
     points = system.at_gauss_points(x)
     size = np.ptp(points, axis=0)
-    states = points[first_least(_speeds(system, x))].copy()
-    for _ in range(_UPDATES):
-        try:
-            update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])
-        except np.linalg.LinAlgError:
-            return None
-        states -= update
-        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
-            break
-    else:
+    slowest = points[first_least(_speeds(system, x))]
+    states = nearest_zero(lambda u: (system.rates(x, u[None])[0], system.rates_by_states(x, u[None])[0]), slowest)
+    if states is None:
         return None
-    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
+    return np.where(np.abs(states) > CORRECTED * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
 
 
 def _spectrum(system: CycleEquations, x: Array, states: Array) -> ComplexArray:
@@ -144,23 +131,24 @@ def _fold_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray]
     F(u, p) = 0 with the smallest updates of u and p. On slow stretches of relaxation oscillations it is far away.
     """
     at = next(system.parameter_index(name) for name in system.free if name != PERIOD)
-    points, y = system.at_gauss_points(x), x.copy()
-    states = points[first_least(_speeds(system, x))].copy()
+    slowest = system.at_gauss_points(x)[first_least(_speeds(system, x))]
     step = np.sqrt(np.finfo(float).eps) * (1 + abs(x[at]))
-    for _ in range(_UPDATES):
-        ahead, rates = y.copy(), system.rates(y, states[None])[0]
-        ahead[at] += step
-        slope = (system.rates(ahead, states[None])[0] - rates) / step
-        matrix = np.column_stack([system.rates_by_states(y, states[None])[0], slope])
-        if not np.isfinite(matrix).all():
-            return None
-        update = np.linalg.lstsq(matrix, -rates)[0]
-        states += update[:-1]
-        y[at] += update[-1]
-        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
-            near = abs(y[at] - x[at]) <= _BESIDE * (1 + abs(x[at]))
-            return (states, _spectrum(system, y, states)) if near else None
-    return None
+
+    def with_parameter(value: float) -> Array:
+        y = x.copy()
+        y[at] = value
+        return y
+
+    def linearized(z: Array) -> tuple[Array, Array]:
+        here, ahead, states = with_parameter(z[-1]), with_parameter(z[-1] + step), z[None, :-1]
+        rates = system.rates(here, states)[0]
+        slope = (system.rates(ahead, states)[0] - rates) / step
+        return rates, np.column_stack([system.rates_by_states(here, states)[0], slope])
+
+    found = nearest_zero(linearized, np.append(slowest, x[at]))
+    if found is None or not abs(found[-1] - x[at]) <= APART * (1 + abs(x[at])):
+        return None
+    return found[:-1], _spectrum(system, with_parameter(found[-1]), found[:-1])
 
 
 def resting_place(system: CycleEquations, x: Array) -> RestingPlace | None:

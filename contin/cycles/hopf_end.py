@@ -14,30 +14,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.labels import Label
+from contin.core.newton import nearest_zero
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial
 from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.root import find_zero
+from contin.levels import DOUBLED, LOCATED, MOST_UPDATES, ROUND_OFF
 from contin.problems.own_names import PERIOD
-
-#: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
-_UPDATES = 20
-#: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units
-#: in the last place. Ten times larger, the point is known to as much less.
-_CONVERGED = 1e-14
-#: First step of the secant method, relative to 1 + the parameter: the square root of round-off.
-_FIRST = 1e-8
-#: The real part at the Hopf point, as a part of the frequency, is below this.
-_ON_AXIS = 1e-9
-
 
 #: The size of a cycle as a part of an earlier one of the run, with a sign.
 AMPLITUDE = Event(Label.HOPF, "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
@@ -94,14 +84,14 @@ def _hopf_point(system: CycleEquations, guess: Array) -> tuple[Array, float, Arr
         return _critical(system, x, states, expected)
 
     first = float(x[at])
-    last, step = critical(first), _FIRST * (1 + abs(first))
-    for _ in range(_UPDATES):
+    last, step = critical(first), DOUBLED * (1 + abs(first))
+    for _ in range(MOST_UPDATES):
         found = critical(float(x[at]) + step)
         change = found.real - last.real
-        if abs(step) <= _CONVERGED * (1 + abs(x[at])) or change == 0:
+        if abs(step) <= ROUND_OFF * (1 + abs(x[at])) or change == 0:
             break
         step, last = -found.real * step / change, found
-    if not abs(found.real) < _ON_AXIS * abs(found.imag):
+    if not abs(found.real) < LOCATED * abs(found.imag):
         raise ConvergenceError("no Hopf point is found near the cycle")
     x[period] *= expected.imag / found.imag
     frequency = 2 * math.pi / float(system.all_parameters(x)[list(system.problem.parameters).index(PERIOD)])
@@ -118,18 +108,9 @@ def _critical(system: CycleEquations, x: Array, states: Array, expected: complex
     ------
     ConvergenceError
     """
-    here: Any = states[0].copy()
-    for _ in range(_UPDATES):
-        jacobian = system.rates_by_states(x, here[None])[0]
-        try:
-            update = np.linalg.solve(jacobian, system.rates(x, here[None])[0])
-        except np.linalg.LinAlgError:
-            break
-        here = here - update
-        if not np.isfinite(here).all():
-            break
-        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(here).max()):
-            states[:] = here
-            values = np.linalg.eigvals(system.rates_by_states(x, here[None])[0])
-            return complex(values[np.abs(values - expected).argmin()])
-    raise ConvergenceError("no equilibrium is found near the cycle")
+    here = nearest_zero(lambda u: (system.rates(x, u[None])[0], system.rates_by_states(x, u[None])[0]), states[0])
+    if here is None:
+        raise ConvergenceError("no equilibrium is found near the cycle")
+    states[:] = here
+    values = np.linalg.eigvals(system.rates_by_states(x, here[None])[0])
+    return complex(values[np.abs(values - expected).argmin()])

@@ -14,12 +14,11 @@ from contin.cycles.equations import is_opposite, is_pair
 from contin.equilibria.equations import AlgebraicEquations
 from contin.events.nearness import NO_MULTIPLIER
 from contin.functions.batch import Batch
+from contin.levels import DOUBLED
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.own_names import ROUNDS, rounds_of
 
-#: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
-_SHRUNK = 1e-7
 #: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
 #: unknowns take as long as sparse ones.
 _MANY = 200
@@ -301,7 +300,7 @@ class MapEquations(AlgebraicEquations):
         first, second = np.split(self.states(x), 2)
         apart = second - first
         apart = apart - whole_rounds(apart, self.circles)
-        return bool(np.all(np.abs(apart) <= _SHRUNK * (1 + np.abs(first))))
+        return bool(np.all(np.abs(apart) <= DOUBLED * (1 + np.abs(first))))
 
     def doubled(self, x: Array) -> tuple[Self, Array]:
         """Return the same problem with twice the rounds, and x for it."""

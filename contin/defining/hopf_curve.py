@@ -26,7 +26,7 @@ from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve, degenerate, other_pairs, signed_smallest
 from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.normal_forms import coefficient, pair
-from contin.levels import SINGULAR
+from contin.levels import DEPENDENT
 
 T = TypeVar("T")
 
@@ -59,7 +59,7 @@ class HopfCurve(CriticalCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the first Lyapunov coefficient; NaN at Bogdanov-Takens points and neutral saddles."""
-        if self.kappa(x) <= SINGULAR * self.kappa_size:
+        if self.kappa(x) <= DEPENDENT * self.kappa_size:
             return UNKNOWN
         return coefficient(self.base, self.inside(x), pair, self.imaginary_part(x))
 

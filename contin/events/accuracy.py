@@ -11,10 +11,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.trial import Trial
 from contin.draws import generator
-
-#: An error up to this many times what Newton's method has left, measured alike, is round-off. On 146 to 328 intervals of the
-#: bank's stiffest problem it is 0.5 to 3 times that. Ten times larger, an error of 1e-10 would stay where Newton leaves 1e-12.
-_UNITS = 10.0
+from contin.levels import CERTAIN
 
 
 @dataclass(frozen=True)
@@ -28,7 +25,7 @@ class Accuracy:
     def is_round_off(self) -> bool:
         """A finer mesh would not make it smaller."""
         trial = self.trial
-        return trial is not None and self.error <= _UNITS * trial.system.newton_error(trial.x, trial.factors)
+        return trial is not None and self.error <= CERTAIN * trial.system.newton_error(trial.x, trial.factors)
 
 
 def accuracy_of(trial: Trial) -> Accuracy:

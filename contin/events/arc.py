@@ -20,11 +20,11 @@ from contin.core.step import located
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
+from contin.levels import CORRECTED
 from contin.shown import shown
 
-#: Part of a step, and part of the corrector's tolerance of it, to which a zero is located: round-off of the place and, of the
-#: function, what the corrector leaves.
-_PRECISE, _SHARE = 1e-12, 1e-2
+#: Part of the corrector's tolerance of a step to which a zero is located: what the corrector leaves is round-off of functions.
+_SHARE = 1e-2
 #: Part of a step to which the place is known from which Newton's method begins that holds an unknown: it does the rest.
 _ROUGH = 1e-3
 #: Points of the curve lie no further off the cubic than this part of the step; others belong to another branch.
@@ -198,7 +198,7 @@ class Arc:
     @property
     def precision(self) -> float:
         """Distance to which zeros are located."""
-        return max(_PRECISE, _SHARE * self.newton.tolerance) * self.step
+        return max(CORRECTED, _SHARE * self.newton.tolerance) * self.step
 
     def beginning(self) -> Trial:
         """Return the state's point, be it a branch point."""

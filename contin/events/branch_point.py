@@ -20,6 +20,7 @@ from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.events.bordered import BorderedMatrix, borders_at
 from contin.events.labelled import Elsewhere, Finding
+from contin.levels import APART, DEPENDENT, LOCATED
 from contin.linalg.border import orthonormal
 from contin.linalg.orientation import ordered, oriented, oriented_along
 
@@ -27,20 +28,14 @@ from contin.linalg.orientation import ordered, oriented, oriented_along
 _SAME_KERNEL = 0.9
 #: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
 _LINEAR = 0.1
-#: Updates that small and no longer shrinking (by less than `_SHRINKING`) are round-off.
-_ROUND_OFF, _SHRINKING = 1e-9, 0.3
+#: Small updates that shrink by less than this factor are round-off.
+_SHRINKING = 0.3
 #: An update is followed by a new Hessian where it is more than this part of the one before.
 _SLOW = 0.05
-#: The Hessian is taken anew for the tangents where x has moved by more since: they are wanted right at the branch point, to
-#: well below what counts as stationary (`contin.events.inspection`). At 1e-5 folds at pitchforks would be missed.
-_MOVED = 1e-6
 #: An update larger than this, relative to 1 + |x|, leaves the neighbourhood for good.
 _GONE = 10
 #: Where the Hessian explains less of the gradient than one half it does not lead to a zero.
 _UNEXPLAINED = 0.5
-#: Singular values of the Hessian below this part of the largest count as zero: a gradient along their direction is not
-#: followed.
-_FLAT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +248,7 @@ class _Search:
         if not (np.isfinite(self._hessian).all() and np.isfinite(matrix.g).all()):
             return False
         correction = matrix.factors.solve(np.concatenate([matrix.residual + self.beta * self._borders[1], [0.0, 0.0]]))
-        drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=_FLAT)[0]
+        drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=DEPENDENT)[0]
         self._drop = drop
         self._gradient = matrix.g
         if np.abs(self._slope @ self._drop - matrix.g).max() > _UNEXPLAINED * np.abs(matrix.g).max():
@@ -272,7 +267,7 @@ class _Search:
     def converged(self) -> bool:
         """The estimated error is below the tolerance, or the updates are round-off."""
         rate = min(1.0, max(_LINEAR, self.size / self.before)) if np.isfinite(self.before) else 1.0
-        return self.size * rate <= self.newton.tolerance or (self.size < _ROUND_OFF and rate > _SHRINKING)
+        return self.size * rate <= self.newton.tolerance or (self.size < LOCATED and rate > _SHRINKING)
 
     def prepare(self) -> None:
         """Drop the Hessian where the last update was not much smaller than the one before."""
@@ -284,7 +279,7 @@ class _Search:
         """Return the branch point: tangents from the algebraic bifurcation equation, the kernel made orthonormal."""
         assert self._hessian is not None
         system, matrix, hessian = self.system, self._matrix, self._hessian
-        if np.max(np.abs(self.x - self._origin)) > _MOVED:
+        if np.max(np.abs(self.x - self._origin)) > APART:
             matrix = BorderedMatrix(system, self.x, *self._borders)
             hessian = matrix.hessian(self.x)
         if not (np.isfinite(matrix.kernel).all() and np.isfinite(hessian).all() and matrix.is_regular()):

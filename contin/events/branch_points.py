@@ -20,13 +20,11 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import locate_branch_point
 from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
 from contin.events.multiple_point import MultiplePoint, locate_multiple_point
+from contin.levels import APART
 from contin.linalg.factors import Factors
 from contin.linalg.orientation import canonical_basis
 from contin.linalg.singular import smallest_directions
 
-#: How far outside a step, as a part of it, a branch point may be found that changes the determinant's sign inside it: places
-#: of branch points are known to about the square root of round-off there.
-OUTSIDE = 1e-6
 #: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
 #: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
 _GAP = 1e-2
@@ -185,7 +183,7 @@ class BranchPointSearch:
             try:
                 found = locate_branch_point(state.system, arc.guess(middle), arc.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
-                inside = arc.low - OUTSIDE * step <= at <= step * (1 + OUTSIDE)
+                inside = arc.low - APART * step <= at <= step * (1 + APART)
                 if inside and found.gap < self._gap and arc.passes_by(found.x, at):
                     found = found.along(state.system, arc.direction(at))
                     return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(state.system, found.x), details=found)
@@ -210,7 +208,7 @@ class BranchPointSearch:
                 found = locate_multiple_point(state.system, arc.guess(middle), state.row, count, arc.newton)
                 assert found.x is not None
                 at = inner(state.system, state.tangent, found.x - state.x)
-                if arc.low - OUTSIDE * step <= at <= step * (1 + OUTSIDE):
+                if arc.low - APART * step <= at <= step * (1 + APART):
                     trial = Trial.without_tangent(state.system, found.x)
                     return SpecialPoint(at, Label.BRANCH_POINT, f"kernel of dimension {found.dimension}", trial, details=found)
         kernel = smallest_directions(arc.trial.factors, state.system.size, count + 1)[0][:count]

@@ -12,20 +12,11 @@ import numpy as np
 
 from contin import draws
 from contin.arrays import Array, Numbers
+from contin.levels import APART, CERTAIN, LOCATED, ROUND_OFF
 
-#: A coefficient is computed again at a point moved by so much, relative to 1 + |x|: points are located to 1e-14 at best.
-#: Ten times larger, errors are ten times as large.
-_MOVED = 1e-14
-#: Its error is so many times the largest change: one draw may hardly count, and a coefficient that is infinite, as at a period
-#: doubling in a conservative system, changes by less than a tenth of its value once in 20 draws. Ten times larger, errors are
-#: ten times as large.
-_CERTAIN = 10.0
 #: A value above this part of its terms, with terms below this size, is no error: that is not estimated. Near where it is
 #: infinite the terms are large: 2e7 at the doubling of Hénon's map with a Jacobian of -1 + 1e-7.
 _CLEAR, _MODERATE = 1e-3, 1e6
-#: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
-#: tests are the same.
-_CANCELLED, _ZERO = 1e-6, 1e-9
 
 
 @dataclass(frozen=True)
@@ -58,22 +49,22 @@ class Coefficient:
         def estimate() -> float:
             random, changes = draws.generator(__name__), []
             for _ in range(draws.DRAWS):
-                moved = x + _MOVED * (1 + np.abs(x)) * draws.signs(random, x)
+                moved = x + ROUND_OFF * (1 + np.abs(x)) * draws.signs(random, x)
                 changes.append(abs(value - float(terms(moved).sum().real)))
-            return float(_CERTAIN * max(changes) + of_derivatives * size)
+            return float(CERTAIN * max(changes) + of_derivatives * size)
 
         return cls(value, size, estimate)
 
     def is_meaningless(self, error: float) -> bool:
         """Return whether an error is as large as the terms, and not just round-off of terms that are zero."""
-        return not (error < self.size or error < _ZERO)
+        return not (error < self.size or error < LOCATED)
 
     def signed(self, known: float) -> float:
         """Return the value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations.
 
         ``known`` is the error of the point, relative to 1 + |x|: what Newton's method left may be more than at located ones.
         """
-        error = self.error * max(1.0, _CERTAIN * known / _MOVED) if not self.is_certain else 0.0
+        error = self.error * max(1.0, CERTAIN * known / ROUND_OFF) if not self.is_certain else 0.0
         return self.value if not abs(self.value) <= error else 0.0
 
     @property
@@ -87,7 +78,7 @@ class Coefficient:
 
         Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
         """
-        small = abs(self.value) < _CANCELLED * self.size + _ZERO
+        small = abs(self.value) < APART * self.size + LOCATED
         return small or (self.size < _MODERATE and abs(self.value) <= self.error)
 
 

@@ -18,12 +18,12 @@ from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Carrier, Discretization
-from contin.core.rounding import LAST_PLACES
 from contin.core.trial import Trial
 from contin.errors import ConvergenceError
 from contin.events.labelled import finding_of
 from contin.events.refinement import ASIDE, zero_again
 from contin.events.usual import fold
+from contin.levels import LAST_PLACES
 
 #: The change from one mesh to the next is multiplied by this: the finer one has an error, too, 1/16 of the coarser one's at
 #: degree 2 and less at higher degrees. It covers both also where the meshes are so coarse that it is a third.

@@ -16,20 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.core.protocol import inner
-from contin.core.rounding import LAST_PLACES
 from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
-from contin.events.branch_points import OUTSIDE
 from contin.events.nearness import DEEPER
 from contin.events.significance import passed_before, sense, senses
 from contin.events.zeros import followed
 from contin.functions.kernel_parts import helper
+from contin.levels import APART, LAST_PLACES, LOCATED
 
-#: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
-_ROUND_OFF = 1e-9
-#: A smallest rate within this part of those at the ends is zero to round-off: an inflection, not two folds.
-_FLAT = 1e-15
 #: The rate right beside a pitchfork's fold is taken at this part of the step from it. Closer, tangents are blurred; further
 #: away, another fold would be between.
 _ASIDE = 1e-2
@@ -104,7 +99,7 @@ class FoldSearch:
     def __init__(self, arc: Arc, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:
         self.arc, self.fold, self.pitchfork = arc, fold, pitchfork
         self._index = arc.trial.system.parameter_index(fold.name)
-        self._outside = OUTSIDE * arc.step
+        self._outside = APART * arc.step
 
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
@@ -122,7 +117,7 @@ class FoldSearch:
         found = self.between(left, right)
         while arc.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
-        clear = max(abs(left[1].value(self.fold)), abs(right[1].value(self.fold))) >= _ROUND_OFF
+        clear = max(abs(left[1].value(self.fold)), abs(right[1].value(self.fold))) >= LOCATED
         if found and not (clear and arc.trial.newton_error <= arc.newton.tolerance):
             self._drop_round_off(found, left, right)
         return found or passed_before(arc, self.fold)
@@ -148,7 +143,7 @@ class FoldSearch:
     def between(self, left: Place, right: Place) -> list[SpecialPoint]:
         """Return the places between two where the rate changes its sign, in order."""
         ends = left[1].value(self.fold), right[1].value(self.fold)
-        if max(abs(ends[0]), abs(ends[1])) < _ROUND_OFF and not self._differs(left[1], right[1]):
+        if max(abs(ends[0]), abs(ends[1])) < LOCATED and not self._differs(left[1], right[1]):
             return []
         fork = self.pitchfork()
         if fork is not None and left[0] - self._outside <= fork.at <= right[0] + self._outside:
@@ -225,7 +220,7 @@ class FoldSearch:
         at, square = self._suspect(left, right, parabola if sign > 0 else parabola.times(sign))
         if at is None:
             return None
-        flat = _FLAT * max(abs(first), abs(last))
+        flat = LAST_PLACES * max(abs(first), abs(last))
         found = followed(self._place, lambda trial: sign * self.rate(trial), (at, square), (left[0], right[0]), flat)
         return found if found is not None and sense(found[1], self.fold, self.arc.newton) else None
 

@@ -24,10 +24,8 @@ from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.normal_forms import pair
 from contin.events.root import find_zero
 from contin.events.spectra import find_moves, moves_of
+from contin.levels import DOUBLED
 
-#: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
-#: of round-off.
-_REAL = 1e-8
 #: Into how many parts a step is divided to look inside it, on the cubic, ...
 _PARTS = 4
 #: ... how often these parts are halved, where eigenvalues move far: peaks of a hundredth of a step are seen. Without, two of
@@ -37,12 +35,8 @@ _CLOSER = 5
 _SMALL = 32
 #: ... and how often a piece is halved: crossings closer than 2^-20 of it are not told apart.
 _CUTS = 20
-#: Hopf points closer than this part of the step are one point with several pairs: round-off of eigenvalues of multiplicity two.
-_TOGETHER = 1e-7
 #: Part of a step before and behind a Hopf point where its pair must lie on different sides of the axis, where that is in doubt.
 _BESIDE = 1e-3
-#: A real part below this, relative to 1 + the eigenvalue's size, is zero at a Hopf point.
-_ON_AXIS = 1e-7
 
 
 @functools.cache
@@ -80,16 +74,16 @@ def _upper(trial: Trial) -> ComplexArray:
     """Return the eigenvalues with a positive imaginary part, and real ones."""
     system: Any = trial.system  # one with eigenvalues
     values: ComplexArray = system.computed_eigenvalues(trial.x)
-    return values[values.imag > -_REAL * (1 + np.abs(values))]
+    return values[values.imag > -DOUBLED * (1 + np.abs(values))]
 
 
 def _is_complex(values: ComplexArray) -> Any:
-    return values.imag > _REAL * (1 + np.abs(values))
+    return values.imag > DOUBLED * (1 + np.abs(values))
 
 
 def _half_plane(values: ComplexArray) -> Any:
     """Return 1 for an eigenvalue above the real axis, -1 below it, 0 on it."""
-    return np.where(np.abs(values.imag) > _REAL * (1 + np.abs(values)), np.sign(values.imag), 0.0)
+    return np.where(np.abs(values.imag) > DOUBLED * (1 + np.abs(values)), np.sign(values.imag), 0.0)
 
 
 def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
@@ -160,7 +154,7 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
         return np.empty(0, complex), np.empty(0, complex)  # as where all is stable
     first, last = _matched(left, right)
     changed = (first.real > 0) != (last.real > 0)
-    upper = (first.imag > -_REAL * (1 + np.abs(first))) | (last.imag > -_REAL * (1 + np.abs(last)))
+    upper = (first.imag > -DOUBLED * (1 + np.abs(first))) | (last.imag > -DOUBLED * (1 + np.abs(last)))
     return first[changed & upper], last[changed & upper]
 
 
@@ -266,19 +260,19 @@ def passes(arc: Arc, at: float, frequency: float) -> bool:
 def _pairs_at(point: SpecialPoint) -> int:
     """Return how many pairs lie on the imaginary axis at a Hopf point."""
     values = _upper(point.trial)
-    return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < _ON_AXIS * (1 + np.abs(values)))))
+    return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < DOUBLED * (1 + np.abs(values)))))
 
 
 def _count_at(point: SpecialPoint, found: list[SpecialPoint], arc: Arc) -> int:
     """Return how many of the points found lie at the place of one of them."""
-    return sum(abs(point.at - other.at) <= _TOGETHER * arc.step for other in found)
+    return sum(abs(point.at - other.at) <= DOUBLED * arc.step for other in found)
 
 
 def _joined(found: list[SpecialPoint], arc: Arc) -> list[SpecialPoint]:
     """Return the points, those at one place joined."""
     result: list[SpecialPoint] = []
     for point in found:
-        if result and point.at - result[-1].at <= _TOGETHER * arc.step:
+        if result and point.at - result[-1].at <= DOUBLED * arc.step:
             if _pairs_at(point) > result[-1].details["pairs"]:
                 result[-1].details["pairs"] += 1
         else:

@@ -28,31 +28,14 @@ from contin.events.labelled import finding_of
 from contin.events.trivial import crossed, round_off
 from contin.events.zeros import separated
 from contin.functions.kernel_parts import helper
+from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED
 
-#: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
-#: labelled already.
-_AT_START = 1e-6
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
 #: A zero of a test function that also vanishes at a fold or branch point nearer than this part of the step is that point: the
 #: place of a fold is known to 2e-4 of a step. Ten times larger, a second zero beside it could be passed.
 _CLOSE = 1e-3
-#: This close to a branch point tangents are round-off: the square root of it, times ten.
-_BLURRED = 1e-7
-#: A test function is zero at the first point of a run where it is smaller by this factor than at the next: a corrected point
-#: that lies on the zero misses it by the corrector's tolerance.
-_ON_ZERO = 1e-8
-#: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
-_STANDS = 1e-11
-#: A tangent's component at a branch point below this is zero: tangents there come from differences with an error of 1e-8.
-_STATIONARY = 1e-7
-#: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
-#: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
-_COINCIDENT = 1e-10
-#: The same on a mesh: where zero and special point coincide in the problem, they differ by the error of the discretization. The
-#: branch point where a branch ends on the trivial one has the trivial quantity at zero to this part; another one has not.
-_NEARLY = 1e-6
 #: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
 _BESIDE = 1e-4
 _STRAYS = "the determinant changes its sign, and no branch point was found"
@@ -63,9 +46,6 @@ FEWEST = 3
 _SAME_WAY = 0.5
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 REACH = 2
-#: Errors of a parameter at the first point of a run, relative to 1 + its size. A thousand times larger, steps that pass near
-#: the value of the first point in every parameter are looked at.
-_VALUE = 1e-6
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
 _SAME, _SAME_SHARE = 1e-4, 2e-3
 #: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
@@ -174,7 +154,7 @@ class Inspection:
     def _at_the_start(self, point: SpecialPoint) -> bool:
         """Return whether a special point is the first point of the run once more."""
         state = self.arc.state
-        near = max(_AT_START * self.arc.step, _BLURRED if state.singular else 0.0)
+        near = max(APART * self.arc.step, DOUBLED if state.singular else 0.0)
         return state.accepted == 0 and point.stop is None and point.at < near
 
     # --- folds ---------------------------------------------------------------------------------------------------
@@ -204,7 +184,7 @@ class Inspection:
         if not tangents:
             return None
         component = tangents[0][self.arc.trial.system.parameter_index(fold.name)]
-        stationary = abs(component) < _STATIONARY
+        stationary = abs(component) < DOUBLED
         return dataclasses.replace(found, label=fold.label, name=fold.name, test=fold) if stationary else None
 
     # --- zeros of test functions ---------------------------------------------------------------------------------
@@ -222,7 +202,7 @@ class Inspection:
         found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
         for left, right in self._pieces(test, same):
             before, after = left[1].value(test), right[1].value(test)
-            if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
+            if state.accepted == 0 and left[0] == 0 and abs(before) < DOUBLED * abs(after):
                 before = 0.0  # the first point lies on the zero
             if not test.passed(before, after):
                 continue
@@ -241,12 +221,12 @@ class Inspection:
         if self._at_the_start(point) or not point.is_located:
             return False
         largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
-        return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
+        return bool(abs(point.trial.value(test)) <= DEPENDENT * largest)
 
     def _nearly(self, test: Event, crossings: list[SpecialPoint]) -> SpecialPoint | None:
         """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
         largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
-        return next((point for point in crossings if abs(point.trial.value(test)) <= _NEARLY * largest), None)
+        return next((point for point in crossings if abs(point.trial.value(test)) <= APART * largest), None)
 
     def _at_special(self, test: Event, point: SpecialPoint) -> SpecialPoint:
         """Return the zero of a test function that lies at a special point."""
@@ -317,7 +297,7 @@ class Inspection:
         arc, name = self.arc, self.settings.trivial
         assert name is not None
         largest = max(abs(arc.before[name]), abs(arc.trial[name]))
-        zero = max(_NEARLY * largest, round_off(point.trial, name, arc.newton))
+        zero = max(APART * largest, round_off(point.trial, name, arc.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
             return False
         return arc.passes_by(point.trial.x, point.at)
@@ -367,7 +347,7 @@ class Inspection:
         at = self.arc.trial.system.parameter_index(fold.name)
         rate, p = known.leaving[0][at], crossing.trial.x[at]
         change, expected = fold.trial.x[at] - p, rate * (fold.at - crossing.at) / 2
-        if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
+        if abs(rate) < DOUBLED or abs(change) < CORRECTED * (1 + abs(p)):
             return False
         return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)
 
@@ -430,7 +410,7 @@ def free_of(home: Discretization, x: Array, system: Discretization) -> Array:
 @helper
 def misses(value: float, first: float, rate: float, last: float, last_rate: float, step: float) -> bool:
     """Return whether a parameter certainly does not take a value in a step, by its values and rates at both ends."""
-    margin = step * max(abs(rate), abs(last_rate)) + _VALUE * (1 + abs(value))
+    margin = step * max(abs(rate), abs(last_rate)) + APART * (1 + abs(value))
     return value < min(first, last) - margin or value > max(first, last) + margin
 
 

@@ -26,28 +26,17 @@ from contin.core.protocol import Carrier, Discretization, inner
 from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
+from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUND_OFF, TINY
 from contin.linalg.border import orthonormal
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
 from contin.linalg.singular import smallest_directions
 
-#: Of a continuum of branches, G on each has a singular value of zero, found as 1e-10 and below; on a single one at the same
-#: distance it is the square of that, some 1e-4.
-_SINGULAR = 1e-7
-#: Gauss-Newton steps; it converges fast or, where there is no multiple point, not at all.
-_MOST_STEPS = 12
-#: Residual of the equations, beta and G together, above which they contradict each other: two branch points, not one.
-_CONSISTENT = 1e-6
-#: Null vectors of an exactly singular matrix are taken this far along the branch, where it can be factored; they only border
-#: the equations, so a distance ten times larger does as well.
-_ASIDE = 1e-6
-#: An update below this is the last one: the next would be its square.
-_ROUND_OFF = 1e-8
 #: Directions from which zeros on a sphere are sought: each of the at most 3^d lines is found many times.
 _DIRECTIONS = 300
 #: Radii of the spheres; the directions of zeros on them are extrapolated to radius zero.
 _SPHERES = 0.02, 0.01
-#: Newton's method on a sphere: its longest step, the step at which it has settled, and its iterations at most.
-_LONGEST, _SETTLED, _MOST_ITERATIONS = 0.5, 1e-12, 50
+#: Longest step of Newton's method on a sphere.
+_LONGEST = 0.5
 #: Distances beyond a cluster at which the branch is looked at: the first, and the least. Where a branch with a double point is
 #: curved, G gives it a length of the square of that, up to 200 times as large.
 _AWAY, _NEAREST = 1e-3, 1e-5
@@ -165,9 +154,9 @@ class _Manifold:
             update = factors.solve(np.concatenate([residual + z[size:] @ self.psi, held]))
             z = z - update
             change = float(np.max(np.abs(update) / (1 + np.abs(z))))
-            if not np.isfinite(change) or (change > last and change > _ROUND_OFF):
+            if not np.isfinite(change) or (change > last and change > DOUBLED):
                 break
-            if change <= max(self.newton.tolerance, 1e-14) or (change >= last / 2 and change < _ROUND_OFF):
+            if change <= max(self.newton.tolerance, ROUND_OFF) or (change >= last / 2 and change < DOUBLED):
                 _, factors = system.linearize(z[:size], self.rows, self.psi)
                 unit = np.hstack([np.zeros((len(self.phi), system.equations)), np.eye(len(self.phi))])
                 self.factors, self.x = factors, z[:size]
@@ -228,17 +217,17 @@ def locate_multiple_point(
     """
     with np.errstate(all="ignore"):
         manifold, s = _bordered(system, x, row, dimension, newton), np.zeros(1 + dimension)
-        for _ in range(_MOST_STEPS):
+        for _ in range(MOST_UPDATES):
             _, beta, G = manifold.at(s)
             slopes = manifold.second()[1]
             residual = np.append(beta, G.ravel())
             jacobian = np.vstack([G, slopes.reshape(-1, 1 + dimension)])
-            update = np.linalg.lstsq(jacobian, residual, rcond=1e-8)[0]
+            update = np.linalg.lstsq(jacobian, residual, rcond=DOUBLED)[0]
             s = s - update
             if not np.isfinite(s).all() or np.max(np.abs(s)) > 1:
                 break
-            if np.max(np.abs(update)) < _ROUND_OFF:
-                if np.max(np.abs(residual)) > _CONSISTENT:
+            if np.max(np.abs(update)) < DOUBLED:
+                if np.max(np.abs(residual)) > APART:
                     break
                 return _described(manifold, s, row, slopes)
     raise ConvergenceError(f"no multiple point of dimension {dimension} near by")
@@ -246,7 +235,7 @@ def locate_multiple_point(
 
 def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newton: Newton) -> _Manifold:
     """Return the manifold with borders made of the null vectors at x; right beside x where the matrix is exactly singular."""
-    for at in (x, x + _ASIDE * row / system.weights):
+    for at in (x, x + APART * row / system.weights):
         right, left, response = smallest_directions(system.linearize(at, (row,))[1], system.size, dimension + 1, 3)
         if np.isfinite(response).all():
             break
@@ -306,11 +295,11 @@ def _spread_on_branch(manifold: _Manifold, s: Array, a: Array) -> float:
     for _ in range(_LOOKS):
         here = here - (here @ a) * a + (s @ a + away) * a
         try:
-            for _ in range(_MOST_STEPS):
+            for _ in range(MOST_UPDATES):
                 _, beta, G = manifold.at(here)
                 update = np.linalg.solve(G @ across, beta)
                 here = here - across @ update
-                if np.max(np.abs(update)) < _ROUND_OFF * away:
+                if np.max(np.abs(update)) < DOUBLED * away:
                     break
             else:
                 return found
@@ -355,14 +344,14 @@ def _is_isolated(manifold: _Manifold, s: Array, direction: Array) -> bool:
     """Return whether the branch that leaves along a direction is a line: G has rank d on it. Without a branch, True."""
     radius, a = _SPHERES[0], direction
     try:
-        for _ in range(_MOST_STEPS):
+        for _ in range(MOST_UPDATES):
             _, beta, G = manifold.at(s + radius * a)
             value = np.append(beta, (a @ a - 1) / 2)
-            step = np.linalg.lstsq(np.vstack([radius * G, a]), value, rcond=_ROUND_OFF)[0]
+            step = np.linalg.lstsq(np.vstack([radius * G, a]), value, rcond=DOUBLED)[0]
             a = a - step
-            if np.max(np.abs(step)) < _ROUND_OFF:
+            if np.max(np.abs(step)) < DOUBLED:
                 singular = np.linalg.svd(G, compute_uv=False)
-                return bool(singular[-1] > _SINGULAR * singular[0])
+                return bool(singular[-1] > DOUBLED * singular[0])
     except ConvergenceError:
         pass
     return True
@@ -373,26 +362,26 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
 
     beta = 1/2 G_1(s).s + 1/3 G_2(s, s).s, with the terms of G of first and second order.
     """
-    scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), 1e-300)
+    scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), TINY)
     ends, errors = starts.copy(), np.full(len(starts), np.inf)
     moving = np.arange(len(starts))
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(MOST_STEPS):
         a = ends[moving]
         first = np.einsum("kij,sj->ski", linear, a)
         second = np.einsum("kijl,sj,sl->ski", quadratic, a, a) * radius
         on_branch = np.einsum("ski,si->sk", first / 2 + second / 3, a) / scale
         value = np.column_stack([on_branch, (np.sum(a * a, axis=1) - 1) / 2])
         slope = np.concatenate([(first + second) / scale, a[:, None]], axis=1)
-        step = np.einsum("sij,sj->si", np.linalg.pinv(slope, rcond=1e-10), value)
+        step = np.einsum("sij,sj->si", np.linalg.pinv(slope, rcond=DEPENDENT), value)
         length = np.linalg.norm(step, axis=1)
         ends[moving] = a - step * np.minimum(1.0, _LONGEST / np.maximum(length, _LONGEST))[:, None]
-        settled = length < _SETTLED
+        settled = length < CORRECTED
         errors[moving[settled]] = np.abs(value[settled]).max(axis=1)
         moving = moving[~settled]
         if not moving.size:
             break
     found: list[Array] = []
-    for end in ends[errors < 1e-9]:
+    for end in ends[errors < LOCATED]:
         if not found or np.linalg.norm(np.array(found) - end, axis=1).min() > _SAME:
             found.append(end)
     return found

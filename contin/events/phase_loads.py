@@ -14,13 +14,8 @@ import numpy as np
 
 from contin.arrays import Array, Indices
 from contin.core.protocol import Discretization
+from contin.levels import CERTAIN, LOCATED
 from contin.problems.statement import phases_of
-
-#: A multiplier below this part of the largest unknown is zero. Symmetries leave 1e-11 at most, loads began at 5e-2; such a load
-#: moves a solution by about this part. A hundred times smaller, round-off counts.
-_ZERO = 1e-9
-#: Nor does one count below this many times the estimated error of the point: multipliers were up to .3 of that.
-_SURE = 10.0
 
 
 def phase_loads(system: Discretization, x: Array, kernel: Sequence[Array], error: float) -> Iterator[tuple[str, float, bool]]:
@@ -29,7 +24,7 @@ def phase_loads(system: Discretization, x: Array, kernel: Sequence[Array], error
     The multiplier of a solution is in the user's units, that of a mode relative to its largest unknown. ``error`` is that of x,
     relative to 1 + size.
     """
-    zero = max(_ZERO, _SURE * error)
+    zero = max(LOCATED, CERTAIN * error)
     for name in phases_of(system.problem):
         at, shown = _places(system, name, x)
         modes = [mode[at] / np.abs(mode).max() for mode in kernel]

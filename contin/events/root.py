@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from contin.errors import ConvergenceError
+from contin.levels import CORRECTED, MOST_HALVINGS
 
 #: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
 _IDLE = 1e3
@@ -22,10 +23,6 @@ _JUMP = 1e-3
 #: Part of the first bracket in which a function has come down to `_JUMP` of its values, even with the slope of a cube root, or
 #: jumps. Ten times larger saves three evaluations of 30 where it jumps, and takes such a root for a jump.
 _CLOSED = _JUMP**3
-#: A value at one end below this part of that at the other is round-off of zero: it is 3e-13 of eigenvalues of sparse matrices.
-_NOISE = 1e-11
-#: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
-_MOST_EVALUATIONS = 60
 
 #: A place and the function's value there.
 Value = tuple[float, float]
@@ -56,8 +53,9 @@ def find_zero(
     known, beyond, closed = [left, right], fa, _CLOSED * abs(b - a)
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
     small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))
-    level = least / 2 if least > _NOISE * max(abs(fa), abs(fb)) else np.inf  # a value that stays above it has not come nearer
-    for _ in range(_MOST_EVALUATIONS):
+    # A value that stays above the level has not come nearer to zero.
+    level = least / 2 if least > CORRECTED * max(abs(fa), abs(fb)) else np.inf
+    for _ in range(MOST_HALVINGS):
         if c is None or not min(a, b) < c < max(a, b):
             c = b - fb * (b - a) / (fb - fa)
             if not min(a, b) < c < max(a, b):

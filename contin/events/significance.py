@@ -21,19 +21,18 @@ from contin.core.step import CLEAR, trial_of
 from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
+from contin.levels import ROUND_OFF
 from contin.linalg.orientation import oriented
 
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
 STANDS = 1e-13
-#: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
-_ROUND_OFF = 1e-14
 #: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
 #: times larger, another fold could lie between.
 _BESIDE = 1e-4
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5
 #: One up to this is not, on a mesh: one that agrees is round-off, too.
-STILL = _ROUND_OFF / (1 + _AGREES)
+STILL = ROUND_OFF / (1 + _AGREES)
 #: Draws of the signs of round-off. One more changes the estimate by a few percent.
 _DRAWS = 3
 
@@ -60,7 +59,7 @@ def _sense(trial: Trial, fold: Event, newton: Newton) -> float:
     if finer is None:
         return 0.0
     again = finer.value(fold)
-    significant = abs(again) > _ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
+    significant = abs(again) > ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
     return float(np.sign(rate)) if significant else 0.0
 
 

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.rounding import NEAR_AXIS, NEAR_CIRCLE
 from contin.core.small import Equations, evaluate_slopes
 from contin.events.nearness import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.levels import APART, LOCATED
 from contin.linalg.spectrum import fill_eigenvalues
 
 #: Parts of a step at which multipliers are known: both ends, and `LOOKS` between them.
@@ -92,14 +92,14 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
         size = math.hypot(x, y)
         if equations.is_map:
             one[i], other[i] = math.log(max(size, NO_MULTIPLIER)), math.atan2(y, x)
-            doubt = doubt or not abs(one[i]) >= NEAR_CIRCLE
+            doubt = doubt or not abs(one[i]) >= APART
         else:
             largest = max(largest, size)
     real, imaginary = spectra.real[number], spectra.imaginary[number]
     for i in range(n):
         x, y = one[i], other[i]
         if not equations.is_map:
-            doubt = doubt or not (abs(x) >= NEAR_AXIS * largest or y == 0.0 or x == 0.0)
+            doubt = doubt or not (abs(x) >= LOCATED * largest or y == 0.0 or x == 0.0)
         at = i
         while at > 0 and (real[at - 1] > x or (real[at - 1] == x and imaginary[at - 1] > y)):
             real[at], imaginary[at] = real[at - 1], imaginary[at - 1]

@@ -12,10 +12,8 @@ import numpy as np
 
 from contin.core.newton import Newton
 from contin.core.trial import Trial, sign_changed
+from contin.levels import CERTAIN
 
-#: Round-off of a quantity, in tolerances of the corrector: Newton's method stops below one, but errors of other unknowns reach
-#: the quantity, too. Ten times larger, a branch that is 1e-10 long would not end.
-_TOLERANCES = 10
 #: The tolerance counts as no less than this: round-off of residuals is not below it however small the tolerance is.
 _LEAST = 1e-13
 #: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or
@@ -26,7 +24,7 @@ _CLEAR = 1e3
 
 def round_off(trial: Trial, name: str, newton: Newton) -> float:
     """Return about how large the quantity can be by errors of the corrector alone."""
-    relative = _TOLERANCES * max(newton.tolerance, trial.newton_error, _LEAST)
+    relative = CERTAIN * max(newton.tolerance, trial.newton_error, _LEAST)
     system = trial.system
     if name in system.free:
         at = system.parameter_index(name)

@@ -11,11 +11,8 @@ from contin.core.trial import Event, Trial
 from contin.events import normal_forms
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.coefficient import Coefficient
+from contin.levels import APART
 from contin.names import value_names
-
-#: A point lies outside a limit where it is further off than this part of the way from the point before: it was located there to
-#: round-off otherwise.
-_OUTSIDE = 1e-6
 
 
 def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[Event]:
@@ -59,7 +56,7 @@ def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -
             break
         for test in ends:
             value, before = test.function(point.trial), last[1].value(test)
-            if before < 0 and value > _OUTSIDE * (abs(before) + value):
+            if before < 0 and value > APART * (abs(before) + value):
                 return [*points[:number], arc.locate(test, last, (point.at, point.trial))]
         last = (point.at, point.trial)
     return points

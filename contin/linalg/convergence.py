@@ -6,6 +6,7 @@ import math
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Vector, helper
+from contin.levels import LOCATED
 
 #: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps
 #: converge slowly. Ten times larger changes nothing on the test bank: the estimated rate decides.
@@ -13,9 +14,6 @@ FAR = 0.1
 #: Chord steps that cost about as much as one factorization. Ten times as many save 7 % of the factorizations on the test bank,
 #: and take more solves; ten times fewer take 49 % more factorizations.
 CHORDS = 4
-#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what an iteration is
-#: worth. They are where round-off of x makes as much.
-ROUND_OFF = 1e-9
 
 
 @helper
@@ -42,13 +40,13 @@ def has_converged(size: float, rate: float, updates: int, tolerance: float) -> b
 @helper
 def stagnates(size: float, rate: float, updates: int) -> bool:
     """Return whether small updates no longer shrink."""
-    return size < ROUND_OFF and updates > 1 and rate >= 0.5
+    return size < LOCATED and updates > 1 and rate >= 0.5
 
 
 @helper
 def diverges(size: float, before: float) -> bool:
     """Return whether an update is more than twice the one before."""
-    return size > 2 * before > ROUND_OFF
+    return size > 2 * before > LOCATED
 
 
 @helper

@@ -22,14 +22,12 @@ from contin.arrays import Array, ComplexArray
 from contin.draws import generator
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
-from contin.levels import ROUND_OFF, TINY
+from contin.levels import MOST_STEPS, ROUND_OFF, TINY
 from contin.linalg.spectrum import fill_eigenvalues
 
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
 #: eigenvalues of a block with such a spread are accurate.
 _APART = 1e4
-#: Rounds of iteration, at most.
-_ROUNDS = 60
 
 
 class Iterates(NamedTuple):
@@ -145,7 +143,7 @@ def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
     """Iterate from the first basis until groups of eigenvalues are apart; fill the groups, and return their number."""
     first, last, triangles, coupling, product, vectors, sizes = iterates
     n, count = sizes.size, 1
-    for _ in range(_ROUNDS):
+    for _ in range(MOST_STEPS):
         for a in range(n):
             for b in range(n):
                 last[a, b] = first[a, b]

@@ -12,6 +12,7 @@ import numpy as np
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper
+from contin.levels import MOST_STEPS
 
 #: Rows and columns are multiplied by powers of this, so that nothing is rounded, ...
 _RADIX = 2.0
@@ -19,8 +20,8 @@ _RADIX = 2.0
 _GAINS = 0.95
 #: An entry below the diagonal is zero where it is below this part of its neighbours.
 _ROUND_OFF = float(np.finfo(float).eps)
-#: QR steps for one eigenvalue, and after how many the shift is an exceptional one.
-_STEPS, _EXCEPTIONAL = 60, 10
+#: QR steps for one eigenvalue after which the shift is an exceptional one.
+_EXCEPTIONAL = 10
 
 
 @kernel(reorder=False, last=True)
@@ -156,7 +157,7 @@ def _iterate(a, first, end, real, imaginary):
         low = _split(a, first, last, norm)
         if low >= last - 1:
             last, steps = _settle(a, low, last, shift, real, imaginary), 0
-        elif steps == _STEPS:
+        elif steps == MOST_STEPS:
             for i in range(first, last + 1):
                 real[i] = imaginary[i] = math.nan
             return

@@ -26,12 +26,12 @@ from contin.core.newton import correct
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
-from contin.levels import LOCATED
+from contin.levels import APART, LOCATED
 from contin.names import exact_text
 from contin.problems.statement import declared
 from contin.results.point import Point
 from contin.results.record import system_of
-from contin.search.deflation import SAME, deflated
+from contin.search.deflation import deflated
 from contin.search.guess import Guess, Options, first_guess
 from contin.search.images import Symmetry, are_one, check_maps, evenly, image
 from contin.search.lagrange import with_guessed_multipliers
@@ -290,7 +290,7 @@ class Site:
                 root = own.carrier(system)(_mapped(own, symmetry, x) if number else x)
                 with contextlib.suppress(ConvergenceError):
                     root = correct(system, root, newton=self.settings.newton).x
-                if all(np.max(np.abs(root - system.lifted(other, root))) > SAME for other in roots):
+                if all(np.max(np.abs(root - system.lifted(other, root))) > APART for other in roots):
                     roots.append(root)
         return roots
 

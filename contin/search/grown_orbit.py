@@ -21,7 +21,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
-from contin.levels import DOUBLED, LOCATED
+from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS
 from contin.linalg.orientation import oriented
 from contin.problems.angles import periods_of, whole_rounds
 from contin.results.point import Point
@@ -34,8 +34,6 @@ _LONGEST = 500.0
 _BACK = 0.95
 #: Values of the parameter on each side that are looked at, closer to each other near the start, as the saddle may end there.
 _VALUES = 24
-#: Halvings of the interval between two values, at most: the bits of a number.
-_HALVINGS = 60
 #: Distance at which an orbit has come back, as a part of its largest one: Newton's method then finds the homoclinic orbit.
 _CLOSE = 1e-3
 #: Where the interval cannot be halved any more, an orbit further off than this part of its largest distance shows a jump of m.
@@ -181,7 +179,7 @@ def _neighbours(saddle: _Saddle, interval: tuple[float, float], direction: int) 
 
 def _bisected(saddle: _Saddle, first: GrownOrbit, second: GrownOrbit, direction: int) -> GrownOrbit | None:
     """Return an orbit between two, on different sides, that comes back close to the saddle; None where m jumps there."""
-    for _ in range(_HALVINGS):
+    for _ in range(MOST_HALVINGS):
         best = min(first, second, key=lambda orbit: orbit.closest)
         if best.closest < _CLOSE:
             return best

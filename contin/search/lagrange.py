@@ -9,13 +9,9 @@ import numpy as np
 from contin.arrays import Array
 from contin.boundary.system import Collocation
 from contin.errors import ProblemError
-from contin.levels import ROUND_OFF
+from contin.levels import MOST_HALVINGS, MOST_UPDATES, ROUND_OFF
 from contin.problems.statement import multipliers_of
 
-#: Most Gauss-Newton steps: one does where the energy is quadratic in the controls.
-_STEPS = 30
-#: Most halvings of a step: a step of 1e-9 of itself gains nothing.
-_HALVINGS = 30
 #: The iteration ends with a step that gains less than this part of the residual: Newton's method goes on from there.
 _SETTLED = 1e-3
 #: The most intervals on which multipliers are looked for: the equations are solved densely. Newton's method does the rest.
@@ -70,13 +66,13 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
     residual, gradient, normal = _equations(system, states, lam, multipliers, share)
     if not np.isfinite(residual).all():
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
-    for _ in range(_STEPS):
+    for _ in range(MOST_UPDATES):
         if not np.any(normal):
             break
         normal[np.diag_indices_from(normal)] += ROUND_OFF * np.trace(normal)
         step = _solved(normal, -gradient, lam.size, (system.degree + 1) * lam.shape[1])
         part = 1.0
-        for _ in range(_HALVINGS):
+        for _ in range(MOST_HALVINGS):
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
             new_multipliers = multipliers + part * step[lam.size :]
             new = _equations(system, states, new_lam, new_multipliers, share)
