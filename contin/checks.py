@@ -18,6 +18,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.names import exact_text
+from contin.shown import ROWS
 
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
@@ -28,12 +29,8 @@ _SHOWN = 60
 def listed(names: Iterable[str]) -> str:
     """Return names as a message shows them: the first of many."""
     found = list(names)
-    more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
-    return ", ".join(found[:_LISTED]) + more
-
-
-#: So many names stand in a message. Ten times more would hide what the message says.
-_LISTED = 20
+    more = f" and {len(found) - ROWS} more" if len(found) > ROWS else ""
+    return ", ".join(found[:ROWS]) + more
 
 
 def shown(value: object) -> str:

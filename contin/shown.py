@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-#: Longest text of a field that is shown in full. A screen has 80 to 130 characters a line.
-_LONGEST = 80
-#: Longest text of all fields: ten lines of a screen. The fields after it are counted.
-_ALL = 1000
+#: Characters of a line: a screen has 80 to 130.
+WIDTH = 80
+#: Lines that a text has at most, and names that a message lists: a screen has 24 lines or more. The others are counted.
+ROWS = 20
+#: Numbers in one line, at most.
+COLUMNS = 8
 
 
 def shown(made: Any) -> str:
@@ -31,7 +33,7 @@ def shown(made: Any) -> str:
     fields: list[str] = []
     for name in names:
         fields.append(f"{name}{_text(getattr(made, name))}")
-        if sum(map(len, fields)) > _ALL:
+        if sum(map(len, fields)) > ROWS * WIDTH:
             fields.append(f"and {len(names) - len(fields)} more")
             break
     return f"{type(made).__name__}({', '.join(fields)})"
@@ -44,4 +46,4 @@ def _text(value: object) -> str:
     if callable(value) and not hasattr(type(value), "_fields"):
         return f": {getattr(value, '__name__', type(value).__name__).strip('<>')}"
     text = repr(value)
-    return f"={text}" if len(text) <= _LONGEST and " at 0x" not in text else f": {type(value).__name__}"
+    return f"={text}" if len(text) <= WIDTH and " at 0x" not in text else f": {type(value).__name__}"

@@ -15,7 +15,10 @@ _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
 #: More threads than any machine has cores for: a bound for what users give.
-_MOST = 1024
+MOST = 1024
+#: Parts of one job that threads share: more than cores usually, so that a core that is busy with something else gets fewer. Two
+#: threads take as long with 4 to 32 parts; with ten times more 1.16 times as long.
+PARTS = 16
 
 
 def count() -> int:
@@ -29,8 +32,8 @@ def count() -> int:
     given = os.environ.get("CONTIN_THREADS", "")
     if not given:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not given.isdecimal() or not 1 <= int(given) <= _MOST:
-        raise ProblemError(f"CONTIN_THREADS: {given!r} must be a whole number from 1 to {_MOST}")
+    if not given.isdecimal() or not 1 <= int(given) <= MOST:
+        raise ProblemError(f"CONTIN_THREADS: {given!r} must be a whole number from 1 to {MOST}")
     return int(given)
 
 

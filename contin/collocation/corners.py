@@ -17,7 +17,7 @@ from contin.functions.tape import Tape
 #: one of them is known from another condition.
 _SAMPLES = 1000
 #: More switches than this are no corners but a curve: tables of so many knots.
-_MOST = 200
+MOST_SWITCHES = 200
 #: Divisions of an interval in which a switch happens into 32, down to the last digit of its ends. The 31 places between are one
 #: block of the interpreter: they take as long as one.
 _DIVISIONS, _DIVIDED = 10, np.arange(33) / 32
@@ -78,7 +78,7 @@ def breaks_of(batch: Batch, domain: tuple[float, float], p: Array, free: Sequenc
         if merged.size == known.size:
             break
         known = merged
-    return known if known.size <= _MOST else np.empty(0)
+    return known if known.size <= MOST_SWITCHES else np.empty(0)
 
 
 def selections(batch: Batch, free: Sequence[int] | Indices = ()) -> Selections | None:
@@ -93,7 +93,7 @@ def _switches(recorded: Recorded, batch: Batch, free: Sequence[int] | Indices) -
         recording, states = recorded.recording, len(batch.signature.states)
         moved = [recording.inputs[states + int(slot)] for slot in free]
         timely, moving = switches(recording.tape, recording.results, recording.time, recording.inputs[:states], moved)
-        of_time = _sides(recorded, timely) if 0 < len(timely) <= _MOST else None
+        of_time = _sides(recorded, timely) if 0 < len(timely) <= MOST_SWITCHES else None
         recorded.kept[key] = of_time, _selections(recorded, batch, moving) if moving else None
     found: tuple[_Values | None, Selections | None] = recorded.kept[key]
     return found

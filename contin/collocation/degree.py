@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from contin.collocation.basis import basis
-from contin.collocation.mesh import share
+from contin.collocation.mesh import MeshControl, share
 
 #: Degrees among which is chosen, and those that they are compared with. Meshes of degree 8 are made from the eighth derivative,
 #: whose round-off often gives them as many intervals as degree 7 has. Degrees below 4 need many intervals wherever they are not
@@ -16,16 +16,14 @@ _CHOSEN, _COMPARED = range(4, 8), range(4, 9)
 #: That of cycles. At degree 7 the mesh has fewer intervals, which suit the cycle but not its multipliers: in AUTO's demos their
 #: errors are 1e-8 to 1e-6 in place of 1e-9.
 CYCLE_DEGREE = 4
-#: Microseconds that a Newton iteration takes for its Python code, for an interval, and for each of (n d)^2 entries of an
-#: interval's block (docs/performance.md, cost laws). If the first were ten times larger, the degree at 1e-12
-#: would be 7 for more than 30 states instead of up to 12; if the last were, for up to 3.
-_ITERATION, _INTERVAL, _ENTRY = 1000.0, 3.0, 0.0075
-#: The fewest intervals: those of special points, which are located on meshes with twice `MeshControl.min_intervals`. With ten
-#: times as many, the degree at 1e-12 would be 7 for up to 5 states.
-_FEWEST = 16
 #: Solutions are considered from one for which every degree has the fewest intervals to one that needs so many times as many.
 #: Ten times more changes no degree.
-_HARDEST, _SAMPLES = 1e4, 200
+_HARDEST = 1e4
+#: Time that a Newton iteration takes for an interval, over that for its Python code (1 ms; docs/performance.md, cost laws). Ten
+#: times less, the degree at 1e-12 would be 7 for more than 30 states instead of up to 12.
+_INTERVAL = 3e-3
+#: The same for each of the (n d)^2 entries of an interval's block. Ten times more, the degree would be 7 for up to 3 states.
+_ENTRY = 7.5e-6
 
 
 @functools.cache
@@ -39,10 +37,9 @@ def usual_degree(states: int, tolerance: float) -> int:
     tolerances from 1e-12 and any number of states, and below 1.6 for fewer than 20 states.
     """
     shares = {d: share(basis(d), tolerance) for d in _COMPARED}
-    easiest = _FEWEST * min(shares.values())
-    integrals = np.geomspace(easiest, _HARDEST * easiest, _SAMPLES)
-    times = {
-        d: _ITERATION + (_INTERVAL + _ENTRY * (states * d) ** 2) * np.maximum(_FEWEST, integrals / shares[d]) for d in _COMPARED
-    }
+    fewest = 2 * MeshControl.min_intervals  # of special points
+    easiest = fewest * min(shares.values())
+    integrals = np.geomspace(easiest, _HARDEST * easiest)
+    times = {d: 1 + (_INTERVAL + _ENTRY * (states * d) ** 2) * np.maximum(fewest, integrals / shares[d]) for d in _COMPARED}
     cheapest = np.min(list(times.values()), axis=0)
     return min(_CHOSEN, key=lambda d: float((times[d] / cheapest).max()))

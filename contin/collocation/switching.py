@@ -19,22 +19,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.collocation.corners import Selections, brackets, narrowed
+from contin.collocation.corners import MOST_SWITCHES, Selections, brackets, narrowed
 from contin.levels import CORRECTED
 
 #: Places on each side of a switch where the gap is looked at, as parts of the distance to the end.
 _PARTS = np.array([0.1, 0.4, 0.7, 1.0])
-#: Half an interval's cost, relative to the size of the state, below which a selection is smooth. It is round-off of the usual
-#: equations; ten times larger, corners in the fourth derivative on 100 intervals are left inside intervals.
-_SMOOTH = 1e-13
-#: Cost of a switch, relative to the size of the state, below which it lies on a mesh point. Ten times larger is seen in the
-#: estimated discretization error; ten times smaller would be round-off on solutions of slope 10.
+#: Cost of a switch, relative to the size of the state, below which it lies on a mesh point; half an interval's cost, below
+#: which a selection is smooth. Ten times larger is seen in the estimated discretization error, and corners in the fourth
+#: derivative on 100 intervals are left inside intervals; ten times smaller would be round-off on solutions of slope 10.
 _SETTLED = 1e-13
 #: Distance from a switch, as a part of half an interval, at which a gap that does not vanish there is told from one that does,
 #: and the part of the largest gap nearby that it has there at least. At a corner it has 1e-5 of that.
 _AT_ONCE, _JUMP = 1e-5, 1e-2
-#: More places than this are no corners but a curve: a table of a hundred knots that a state passes on its way up and down.
-_MOST = 200
 
 
 class Switching(NamedTuple):
@@ -105,7 +101,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         half = (mesh[at + 1] - mesh[at]) / 2
         ends = np.array([np.maximum(a - half, mesh[0]), np.minimum(b + half, mesh[-1])])
         # a selection that is smooth so far out needs no place: to find places costs most
-        rough = np.fmin(worst(a, ends[0], which), worst(b, ends[1], which)) * half > _SMOOTH
+        rough = np.fmin(worst(a, ends[0], which), worst(b, ends[1], which)) * half > _SETTLED
         if not rough.any():
             return NOWHERE
         which, at, half = which[rough], at[rough], half[rough]
@@ -115,7 +111,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         gap = np.fmin(*[worst(places, end, which) for end in ends])
         missed = [worst(places, end, which) for end in inside]
         beside = [largest((places + (end - places) * _AT_ONCE)[:, None], places, which)[:, 0] for end in ends]
-        kept = gap * half > _SMOOTH
+        kept = gap * half > _SETTLED
         costs = np.fmin(missed[0] * (places - inside[0]), missed[1] * (inside[1] - places))
         jumps = np.fmin(*beside) > _JUMP * gap
     edge = CORRECTED * (mesh[-1] - mesh[0])
@@ -147,7 +143,7 @@ def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Arr
 
 def _merged(found: Switching, system: Any) -> Switching:
     """Return the places in order, those closer than round-off made one."""
-    if not found.places.size or found.places.size > _MOST:
+    if not found.places.size or found.places.size > MOST_SWITCHES:
         return NOWHERE
     order = np.argsort(found.places, kind="stable")
     places, costs, jumps = found.places[order], found.costs[order], found.jumps[order].astype(bool)

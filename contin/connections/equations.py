@@ -15,6 +15,7 @@ from contin.collocation.mesh import MeshControl
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
+from contin.core.spectral import KEPT
 from contin.core.system import System
 from contin.draws import generator
 from contin.errors import ConvergenceError
@@ -26,7 +27,6 @@ from contin.problems.statement import Statement
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
 #: Number of results at points that are kept, subspaces and eigenvalues: a step asks for those of a few iterates.
-_KEPT = 24
 _Result = TypeVar("_Result")
 
 
@@ -188,7 +188,7 @@ class ConnectionEquations(Conditioned):
         """Return what is made of a vector, made once for the last few of them."""
         key = what, at.tobytes()
         if key not in self._known:
-            if len(self._known) > _KEPT:
+            if len(self._known) > KEPT:
                 self._known.clear()
             self._known[key] = make()
         found: _Result = self._known[key]

@@ -12,10 +12,11 @@ from contin.continuation.notes import Notes
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, State, Stop
-from contin.core.step import aims, corrected, judged, predict
+from contin.core.step import LONGER, aims, corrected, judged, predict
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError
+from contin.levels import MOST_STEPS
 from contin.names import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -24,11 +25,9 @@ _STANDING = 6
 _SHORTER = (1e-2, 1e-4)
 #: Looser tolerances that are tried, as multiples of the one that failed: the smallest that goes on is told.
 _LOOSER = (1e3, 1e4, 1e5)
-#: An advice must let the run go on for so many steps, and over so many times ``min_step`` or, with a looser tolerance, as
-#: far as a first step: one step may succeed right before what ends the run. No more than the third number of steps are tried.
-_STEPS, _WAY, _MOST = 10, 2, 100
-#: Each of them is tried so much longer than the one before.
-_LONGER = 1.5
+#: An advice must let the run go on for so many steps, and over ``min_step`` or, with a looser tolerance, as far as a first
+#: step: one step may succeed right before what ends the run.
+_STEPS = 10
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
@@ -94,7 +93,7 @@ def advice(state: State, settings: Settings) -> str:
         return ""
     for times in _LOOSER:
         loose = dataclasses.replace(settings.newton, tolerance=times * settings.newton.tolerance)
-        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), settings.step / _WAY):
+        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), settings.step):
             return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
     if (shorter := _least_step(state, settings)) is not None:
         return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
@@ -151,9 +150,9 @@ def _on_finer_mesh(state: State) -> State | None:
 
 
 def _goes_on(state: State, settings: Settings, way: float) -> bool:
-    """Return whether a run with these settings makes some steps from a state, and some times a ``way``."""
-    step, gone, way = settings.min_step, 0.0, _WAY * way
-    for number in range(_MOST):
+    """Return whether a run with these settings makes some steps from a state, and goes a ``way``."""
+    step, gone = settings.min_step, 0.0
+    for number in range(MOST_STEPS):
         if number >= _STEPS and gone >= way:
             return True
         trial = _next(state, step, settings)
@@ -166,7 +165,7 @@ def _goes_on(state: State, settings: Settings, way: float) -> bool:
             state, x=trial.x, tangent=trial.tangent, previous_tangent=state.tangent, previous_step=step, singular=False
         )
         gone += step
-        step = min(_LONGER * step, settings.max_step)
+        step = min(LONGER * step, settings.max_step)
     return False
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.meshes import finer, is_poor
+from contin.continuation.meshes import ATTEMPTS, finer, is_poor
 from contin.continuation.scaling import renewed, scaled
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization, inner
@@ -24,9 +24,7 @@ from contin.levels import APART, LOCATED
 from contin.names import value_names
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
-_ROUNDS = 3
-#: Finer and finer meshes that are tried.
-_ATTEMPTS = 4
+ROUNDS_OF_MESHES = 4
 
 
 def on_branch(system: Discretization, x: Array, tangent: Array, settings: Settings, singular: bool) -> State:
@@ -46,7 +44,7 @@ def corrected_first(system: Discretization, x: Array, settings: Settings, primar
     ConvergenceError
         Newton's method fails.
     """
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS_OF_MESHES):
         system, x, row = _on_switches(system, x, settings, primary)
         adapted = system.adapted(x, settings.mesh)
         if adapted is None:
@@ -74,7 +72,7 @@ def _accurate(
     system: Discretization, x: Array, linear: Linearization, settings: Settings, primary: str
 ) -> tuple[Discretization, Array, Linearization]:
     """Return the point on a mesh on which its error is within the tolerance, as far as one is found."""
-    for _ in range(_ATTEMPTS):
+    for _ in range(ATTEMPTS):
         accuracy = accuracy_of(Trial(system, x, linear))
         other = finer(system, x, accuracy.error, settings.mesh) if is_poor(accuracy, settings.mesh) else None
         if other is None:

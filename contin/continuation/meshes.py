@@ -29,7 +29,7 @@ from contin.events.trivial import jumped
 #: equations inside an interval, meshes would grow without end.
 _HELPS = 0.5
 #: Times that a step is made on finer and finer meshes.
-_ATTEMPTS = 4
+ATTEMPTS = 4
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
 _MARGIN = 0.1
@@ -166,7 +166,7 @@ class MeshPolicy:
         control = self.steps.settings.mesh
         arc, judgement = self.steps.attempt(run.state, run.here(), step, made)
         accuracy = accuracy_of(arc.trial.settled)
-        for _ in range(_ATTEMPTS):
+        for _ in range(ATTEMPTS):
             end, known = arc.trial.settled, (run.state, run.here())
             if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break

@@ -13,12 +13,11 @@ from contin.core.state import Reason, Stop
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
+from contin.shown import WIDTH
 
 #: Seconds before a line is shown, and between two of them: calls that are done at once show none, and the terminal is not
 #: flooded.
 _FIRST, _BETWEEN = 1.0, 0.2
-#: A line is no longer than this: a longer one would not be overwritten on a terminal of 80 columns.
-_WIDTH = 79
 
 
 class Progress:
@@ -59,14 +58,14 @@ class Progress:
             self.clear()
 
     def _show(self, text: str) -> None:
-        self._file.write(f"\r{text[:_WIDTH]:<{_WIDTH}}")
+        self._file.write(f"\r{text[: WIDTH - 1]:<{WIDTH - 1}}")
         self._file.flush()
         self._next, self._shown = time.monotonic() + _BETWEEN, True
 
     def clear(self) -> None:
         """Leave an empty line."""
         if self._shown:
-            self._file.write(f"\r{'':<{_WIDTH}}\r")
+            self._file.write(f"\r{'':<{WIDTH - 1}}\r")
             self._file.flush()
             self._shown = False
 

@@ -39,23 +39,22 @@ from contin.events.significance import on_finer_mesh
 from contin.levels import APART, CORRECTED, DOUBLED
 from contin.problems.statement import declared
 
-#: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
-#: times more separate eigenvalues that differ by a tenth.
+#: Iterations of the power method, and largest Krylov space that parts close eigenvalues. Sizes are powers of two: the distance
+#: to the nearest singular point needs no digits. Ten times more separate eigenvalues that differ by a tenth.
 _ITERATIONS = 12
 #: The iterations end earlier where their numbers change by less than this part. Without it, sizes of the benchmarks' half loop
 #: take a third longer; with ten times more or less they take the same, and the tests find the same.
 _SETTLED = 1e-3
 #: Fewest numbers that are compared.
 _FEWEST = 4
-#: Largest Krylov space that parts close eigenvalues: those that differ by a tenth. Twice as many part some that differ by 1e-2.
-_KRYLOV = 12
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
 #: close; at .5 what it leaves of others counts as their size.
 _LASTS = 0.1
 #: A size that only a null vector gives is a guess on the side of small ones: above this it is one. Guesses of 1e-3 to 8e-3
 #: make a branch of configs/open_shear.yaml so long that its points do not do.
 _FAR = 9e-4
-#: ... and once where that is below this part of what was found. Of single numbers two that are nothing but round-off agree to a
+#: Round-off is told by what changes where everything is computed again, and once where that is below this part of what was
+#: found. Of single numbers two that are nothing but round-off agree to a
 #: thirtieth in one case of fifty: under one of OpenBLAS's kernels an arch had a multiplier of size 1e-16, and did not move.
 _CLEAR = 1e4
 #: Largest number of states that are looked at one by one: more would take longer than the run.
@@ -299,8 +298,8 @@ class _FirstPoint:
 
     def _parted(self, v: Array, direction: Array, order: int) -> tuple[Array, float] | None:
         """Return the eigenvector of the largest eigenvalue in the Krylov space of v, and that; None where it is complex."""
-        basis, matrix = [v / np.linalg.norm(v)], np.zeros((_KRYLOV + 1, _KRYLOV))
-        for place in range(_KRYLOV):
+        basis, matrix = [v / np.linalg.norm(v)], np.zeros((_ITERATIONS + 1, _ITERATIONS))
+        for place in range(_ITERATIONS):
             image = self._changed(basis[-1], direction, order)
             size = np.linalg.norm(image)
             for _ in range(2):

@@ -32,7 +32,7 @@ from contin.collocation.one_call import (
 from contin.collocation.workspace import Workspace
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError
-from contin.levels import CORRECTED, LOCATED, MOST_STEPS
+from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES
 from contin.linalg.condensation import Factorization
 from contin.linalg.convergence import (
     CHORDS,

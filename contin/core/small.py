@@ -23,8 +23,9 @@ from contin.linalg.small import factor_small, solve_small
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
 BELIEVED, FAILED, ASKS = range(3)
-#: Largest number of unknowns: from some fifty on, LAPACK's factors are faster than those of a kernel.
-_SMALL = 32
+#: Largest number of unknowns of a small problem, whose eigenvalues take less time than a step: from some fifty on, LAPACK's
+#: factors are faster than those of a kernel.
+SMALL = 32
 
 
 class Equations(NamedTuple):
@@ -69,7 +70,7 @@ SIGN, UPDATES, ERROR = range(3)
 def equations_of(system: Any) -> Equations | None:
     """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
     batch: Batch | None = system.small_equations
-    if batch is None or batch.interpreted is not None or system.size > _SMALL or system.size != system.equations + 1:
+    if batch is None or batch.interpreted is not None or system.size > SMALL or system.size != system.equations + 1:
         return None
     n, count, size, gain = system.state_size, system.equations, system.size, system.gain
     rates = system.scales.rows["residual"] / system.scales.states if count == n else np.ones(count)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from contin.arrays import Array, ComplexArray
 
-#: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
-_KEPT = 64
+#: Results at points, as sets of eigenvalues, that are kept: more than a search for Hopf points compares.
+KEPT = 64
 
 
 class Spectral:
@@ -55,7 +55,7 @@ class Spectral:
         return {}
 
     def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
-        if len(self._spectra_found) > _KEPT:
+        if len(self._spectra_found) > KEPT:
             del self._spectra_found[next(iter(self._spectra_found))]
         self._spectra_found[key] = found
 

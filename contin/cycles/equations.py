@@ -21,6 +21,7 @@ from contin.collocation.monodromy import DRIFTED, Monodromy, fill_multipliers, m
 from contin.core.protocol import Carrier
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
+from contin.core.spectral import KEPT
 from contin.errors import ProblemError
 from contin.functions.batch import Columns
 from contin.levels import APART, DOUBLED, LOCATED
@@ -34,8 +35,6 @@ from contin.problems.own_names import PERIOD, rounds_of
 
 #: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
 _SPLIT = 100.0
-#: Multipliers of so many orbits are kept.
-_KEPT = 50
 #: Share of the period's relative change in the length of a step: weight of (change of T)^2 / (1 + T)^2. With 1 in place of it
 #: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
 #: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
@@ -266,7 +265,7 @@ class PeriodicEquations(Collocation):
         """Return the logarithms of the multipliers, which lie on the unit circle, and all as computed, once."""
         key = x.tobytes()
         if key not in self._known:
-            if len(self._known) > _KEPT:
+            if len(self._known) > KEPT:
                 self._known.clear()
             values = self._computed(x)
             neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))

@@ -16,12 +16,9 @@ from contin.events.nearness import NO_MULTIPLIER
 from contin.functions.batch import Batch
 from contin.levels import DOUBLED
 from contin.linalg.periodic import log_eigenvalues
+from contin.linalg.sparse import MANY
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.own_names import ROUNDS, rounds_of
-
-#: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
-#: unknowns take as long as sparse ones.
-_MANY = 200
 
 
 class MapEquations(AlgebraicEquations):
@@ -73,7 +70,7 @@ class MapEquations(AlgebraicEquations):
     @property
     def is_sparse(self) -> bool:
         """The matrix is kept sparse: the cycle is long, and few of the entries are not zero."""
-        return self.state_size >= _MANY and self.rounds >= _MANY // self._n
+        return self.state_size >= MANY and self.rounds >= MANY // self._n
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multipliers are in doubt: they never are."""

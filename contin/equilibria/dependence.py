@@ -18,14 +18,13 @@ from contin.draws import ASIDE, PLACES, generator
 from contin.equilibria.equations import AlgebraicEquations
 from contin.levels import APART, CERTAIN, LOCATED
 from contin.linalg.dense import DenseFactors
+from contin.shown import COLUMNS
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000
 #: Sizes of the states at places where a total must stay, one after the other: conditions on states, such as a threshold, would
 #: have to lie beyond all of them to be missed.
 _SIZES = (1.0, 0.1, 3.0, 10.0, 100.0)
-#: Terms of a combination that are written out.
-_TERMS = 6
 
 
 def dependence(system: AlgebraicEquations, x: Array) -> str:
@@ -156,7 +155,7 @@ def _of_states(system: AlgebraicEquations, vectors: Array) -> str:
         return ""
     names = system.named_states
     moved = [f"{name} by {part:.6g}" for name, part in zip(names, vectors[0]) if part]
-    text = ", ".join(moved[:_TERMS]) + (", ..." if len(moved) > _TERMS else "")
+    text = ", ".join(moved[:COLUMNS]) + (", ..." if len(moved) > COLUMNS else "")
     held = names[_first(vectors[0])]
     what = f"residual: no equation changes when states change together ({text})"
     return f"{what}: add the equation that {held} is held, and free a parameter"
@@ -166,8 +165,8 @@ def written(vector: Array, names: Sequence[str]) -> str:
     """Return a combination of names, such as "x + 2 y"."""
     text = ""
     places = np.flatnonzero(vector)
-    for i in places[:_TERMS]:
+    for i in places[:COLUMNS]:
         size = "" if abs(abs(vector[i]) - 1) < LOCATED else f"{abs(vector[i]):.6g} "
         sign = "-" if vector[i] < 0 else "+"
         text += f" {sign} {size}{names[i]}" if text else f"{'-' if vector[i] < 0 else ''}{size}{names[i]}"
-    return text + (" + ..." if len(places) > _TERMS else "")
+    return text + (" + ..." if len(places) > COLUMNS else "")

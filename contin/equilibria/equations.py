@@ -23,7 +23,7 @@ from contin.levels import CORRECTED
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors
 from contin.linalg.rightmost import nearest, rightmost
-from contin.linalg.sparse import SparseFactors
+from contin.linalg.sparse import MANY, SparseFactors
 from contin.problems.angles import whole_rounds
 
 
@@ -108,9 +108,9 @@ class AlgebraicEquations(Spectral, System):
         """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse
         one."""
         if self.problem.jacobian is not None:
-            return self.state_size >= _MANY and self.problem.gives_sparse_matrix
+            return self.state_size >= MANY and self.problem.gives_sparse_matrix
         entries = self._by_unknowns.rows.size
-        return self.state_size >= _MANY and entries <= _FEW * self.size * self.equations
+        return self.state_size >= MANY and entries <= _FEW * self.size * self.equations
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
@@ -368,8 +368,6 @@ class AlgebraicEquations(Spectral, System):
         return other, other.pack(self.states(x), values)
 
 
-#: Smallest number of states for which a sparse matrix is considered. Below, a dense factorization takes no longer.
-_MANY = 200
 #: Largest part of its entries that may differ from zero.
 _FEW = 0.1
 #: The t of functions that do not take it.

@@ -13,6 +13,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array, Function, Places
+from contin.collocation.mesh import MOST_INTERVALS
 from contin.core.scales import Scales
 from contin.equilibria.dependence import conservation_laws, written
 from contin.equilibria.system import Algebraic
@@ -25,9 +26,6 @@ from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 from contin.problems.vector_field import combined, returning
-
-#: Most states, with a sparse matrix of some GB: a bound so that a slip of the keyboard is a sentence and not a full memory.
-_MOST_STATES = 1_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,7 +96,7 @@ class AlgebraicProblem(Restated):
     domain: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        self._keep(states=check_statement(self.states, self.parameters, self.functionals, _MOST_STATES))
+        self._keep(states=check_statement(self.states, self.parameters, self.functionals, MOST_INTERVALS))
         checks.truth("dynamics", self.dynamics)
         if self.count is not None:
             checks.whole("count", self.count, 1, MOST_CONDITIONS)

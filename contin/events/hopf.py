@@ -18,6 +18,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
 from contin.core.labels import Label
+from contin.core.small import SMALL
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -31,8 +32,6 @@ _PARTS = 4
 #: ... how often these parts are halved, where eigenvalues move far: peaks of a hundredth of a step are seen. Without, two of
 #: 187 Hopf points of random problems are passed, in a step of 30 times their distance, ...
 _CLOSER = 5
-#: ... of this many unknowns at most, whose eigenvalues at a place take less time than a step, ...
-_SMALL = 32
 #: ... and how often a piece is halved: crossings closer than 2^-20 of it are not told apart.
 _CUTS = 20
 #: Part of a step before and behind a Hopf point where its pair must lie on different sides of the axis, where that is in doubt.
@@ -96,7 +95,7 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     moves, unclear = _moving(looked)
     if not any(moves):
         return []
-    if arc.trial.system.size <= _SMALL:  # otherwise each place takes long
+    if arc.trial.system.size <= SMALL:  # otherwise each place takes long
         looked, moves = _looked_at_closely(arc, looked, moves, unclear)
     passed = _passed(looked, moves)
     if len(passed) > 1 or (passed and not any(_passes_as_pair(a[1], b[1]) for a, b in itertools.pairwise(knots))):

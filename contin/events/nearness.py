@@ -8,12 +8,11 @@ from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix
 
 #: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
-#: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
-#: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
-#: nearly all steps are looked at inside, and multipliers are computed up to three times as often.
+#: little less than the distance pi of 1 from -1, or nearer than so many times its change over the step. A pair can reach -1 and
+#: come back, and be at the ends where it was nearly: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in
+#: one step are passed. Ten times larger, nearly all steps are looked at inside, and multipliers are computed up to three times
+#: as often.
 _NEAR = 3.0
-#: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
-_CHANGES = 3.0
 
 #: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
 #: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
@@ -60,6 +59,6 @@ def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int, longer: fl
             elif what == MINUS_ONE:
                 stays = y == 0.0 and partner == math.inf and not map_
                 distance = math.inf if stays else math.hypot(x, math.pi - abs(y))
-            if not (distance > _NEAR and _CHANGES * move < distance):
+            if not (distance > _NEAR and _NEAR * move < distance):
                 return 1
     return 0

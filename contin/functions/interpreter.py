@@ -48,12 +48,12 @@ from contin.functions.tape import Tape
 #: twice as often.
 LANES = 32
 #: Numbers that arithmetic takes together: a vector register of AVX-512.
-_GROUP = 8
+GROUP = 8
 
 #: Bytes of a register.
 _REGISTER = 8 * LANES
 #: Bytes of a group.
-_BYTES = 8 * _GROUP
+_BYTES = 8 * GROUP
 #: Bytes of an instruction.
 _ROW = 8 * 5
 
@@ -90,7 +90,7 @@ class _Writer:
 
     def __init__(self, builder: Builder, memory: Memory, widths: Widths, lanes: Value) -> None:
         self.builder, self.memory, self.widths, self.lanes = builder, memory, widths, lanes
-        self.groups = builder.udiv(builder.add(lanes, _number(_GROUP - 1)), _number(_GROUP))
+        self.groups = builder.udiv(builder.add(lanes, _number(GROUP - 1)), _number(GROUP))
         self.d = self.a = self.b = self.c = None
 
     def register(self, number: Value) -> Value:
@@ -113,7 +113,7 @@ class _Writer:
     def splat(self, value: Value) -> Value:
         none = constant(_group(), llvm().Undefined)
         first = self.builder.insert_element(none, value, constant(whole(32), 0))
-        return self.builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), _GROUP), [0] * _GROUP))
+        return self.builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), GROUP), [0] * GROUP))
 
     def vector(self, value: Callable[..., Value], operands: list[Value], scalars: list[Value]) -> None:
         """d = value(operands, scalars), eight lanes at a time; scalars are the same in all."""
@@ -173,7 +173,7 @@ class _Writer:
 
 def _group() -> Type:
     """Return LLVM's type of a group."""
-    return llvm().VectorType(double(), _GROUP)
+    return llvm().VectorType(double(), GROUP)
 
 
 def _number(value: int) -> Value:
@@ -181,7 +181,7 @@ def _number(value: int) -> Value:
 
 
 def _intrinsic(builder: Builder, name: str) -> Callable[[Value], Value]:
-    full = f"llvm.{name}.v{_GROUP}f64"
+    full = f"llvm.{name}.v{GROUP}f64"
     kind = llvm().FunctionType(_group(), [_group()])
     function = builder.module.globals.get(full) or llvm().Function(builder.module, kind, full)
     return lambda x: builder.call(function, [x])
@@ -192,11 +192,11 @@ def _truth(builder: Builder, condition: Value) -> Value:
 
 
 def _zeros() -> Value:
-    return constant(_group(), [0.0] * _GROUP)
+    return constant(_group(), [0.0] * GROUP)
 
 
 def _sign(builder: Builder, x: Value) -> Value:
-    one, minus = (constant(_group(), [value] * _GROUP) for value in (1.0, -1.0))
+    one, minus = (constant(_group(), [value] * GROUP) for value in (1.0, -1.0))
     below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
     return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
 

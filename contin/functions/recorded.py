@@ -17,6 +17,7 @@ from contin.functions.program import Inputs, Program, Slope, program
 from contin.functions.recording import checked, record, sized
 from contin.functions.signature import Signature, UserFunction
 from contin.functions.tape import Number, Unrecordable
+from contin.threads import PARTS
 
 
 class Request(NamedTuple):
@@ -127,7 +128,7 @@ class Recorded:
         count, kind = len(u), len(found.code)
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
             blocks = -(-count // LANES)
-            ends = [min(count, LANES * (blocks * part // _PARTS)) for part in range(_PARTS)] + [count]
+            ends = [min(count, LANES * (blocks * part // PARTS)) for part in range(PARTS)] + [count]
             parts = [(found, (t[a:b], u[a:b], v[a:b]), p, out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
             threads.each(lambda part: run(*part), parts)
             return
@@ -225,5 +226,3 @@ _NO_JACOBIAN = np.empty((0, 0, 0))
 _MANY = 256
 #: So are those that take fewer seconds. Ten times fewer would be the time that it takes to wake another thread.
 _LONG = 0.5e-3
-#: Parts that several threads share: more than cores usually, so that a core that is busy with something else gets fewer.
-_PARTS = 16

@@ -15,13 +15,11 @@ import numpy as np
 from contin import threads
 from contin.arrays import Indices
 from contin.functions.kernel_parts import IndexVector
+from contin.threads import PARTS
 
 #: Numbers in the blocks of all intervals from which on there are segments. There a Newton iteration takes .7 times as long with
 #: two threads as with one (300 intervals, 13 states, degree 4); with four times fewer numbers it takes as long.
 _LARGE = 2**20
-#: Segments of a large matrix: more than cores usually, so that a core that is busy with something else gets fewer of them. Two
-#: threads take as long with 4 to 32 segments; with ten times more 1.16 times as long.
-_MOST = 16
 
 
 class Share(NamedTuple):
@@ -42,7 +40,7 @@ ALL = -1
 
 def share(intervals: int, numbers: int) -> Share:
     """Return the whole of a matrix with this many intervals and ``numbers`` in their blocks."""
-    return _share(intervals, max(1, min(_MOST, intervals // 2)) if numbers >= _LARGE else 1)
+    return _share(intervals, max(1, min(PARTS, intervals // 2)) if numbers >= _LARGE else 1)
 
 
 @functools.lru_cache(maxsize=32)  # each matrix of a mesh asks for it

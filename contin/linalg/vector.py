@@ -14,10 +14,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from contin.functions.interpreter import GROUP
 from contin.functions.kernel_parts import Builder, Value, constant, double, for_range, instruction, llvm, variable, whole
 
-#: Columns that are updated at a time: a vector register of AVX-512. From 4 to 64 all matrices take the same time.
-_WIDTH = 8
 #: Columns that are eliminated together, and rows that are updated together. With 2 elimination takes 1.2 times as long, with 8
 #: 1.1 times. Code for each size up to it is written: with 16 kernels take 2.7 times as long to compile.
 PANEL = 4
@@ -466,11 +465,11 @@ def _plus(builder: Builder, total: Value, factor: Value, vector: Value) -> Value
 
 
 def _for_tiles(builder: Builder, length: Value, tile: Callable[[Value, int], None]) -> None:
-    """Write ``tile(offset in bytes, width)`` for ``length`` numbers: `_WIDTH` at a time, then half as many, and so on."""
-    whole = builder.udiv(length, _number(_WIDTH))
+    """Write ``tile(offset in bytes, width)`` for ``length`` numbers: `GROUP` at a time, then half as many, and so on."""
+    whole = builder.udiv(length, _number(GROUP))
     with for_range(builder, whole) as loop:
-        tile(builder.mul(loop.index, _number(8 * _WIDTH)), _WIDTH)
-    offset, width = builder.mul(whole, _number(8 * _WIDTH)), _WIDTH // 2
+        tile(builder.mul(loop.index, _number(8 * GROUP)), GROUP)
+    offset, width = builder.mul(whole, _number(8 * GROUP)), GROUP // 2
     while width:
         there = builder.icmp_unsigned("!=", builder.and_(length, _number(width)), _number(0))
         with builder.if_then(there):

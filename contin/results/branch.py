@@ -16,9 +16,7 @@ from contin.results import curve as curves
 from contin.results import plot, table
 from contin.results.axes import Axes
 from contin.results.point import Point
-
-#: Labels that the text of a branch shows: a screen is not filled by a snaking branch of a hundred folds.
-_SHOWN = 40
+from contin.shown import ROWS
 
 
 @dataclass
@@ -45,8 +43,8 @@ class Branch:
 
     def __repr__(self) -> str:
         found = [point.label for point in self.points if point.label]
-        left_out = f" ... {found[-1]} ({len(found)} labels)" if len(found) > _SHOWN else ""
-        labels = " ".join(found[:_SHOWN]) + left_out
+        left_out = f" ... {found[-1]} ({len(found)} labels)" if len(found) > ROWS else ""
+        labels = " ".join(found[:ROWS]) + left_out
         notes = f"; {len(self.notes)} note{'s' * (len(self.notes) != 1)}" if self.notes else ""
         return f"Branch({len(self.points)} points{table.meshes(self.points)}: {labels}; {self.stop or 'not ended'}{notes})"
 

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 
 from contin.results.marks import heading
 from contin.results.record import Record
-
-#: Rows that a table lists: about a screen. The others are counted.
-_MOST_ROWS = 20
+from contin.shown import ROWS
 
 
 def point_to_html(point: Record) -> str:
@@ -28,6 +26,6 @@ def point_to_html(point: Record) -> str:
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]], what: str = "rows") -> str:
     """Return a table that fits on a screen; rows beyond it are counted."""
     names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
-    body = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows[:_MOST_ROWS])
-    more = f"<p>and {len(rows) - _MOST_ROWS} more {what}</p>" if len(rows) > _MOST_ROWS else ""
+    body = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows[:ROWS])
+    more = f"<p>and {len(rows) - ROWS} more {what}</p>" if len(rows) > ROWS else ""
     return f"<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>{more}"

@@ -18,6 +18,7 @@ from contin.results.cubic import PARTS
 from contin.results.curve import column, curve
 from contin.results.marks import heading, mark_of
 from contin.results.point import Point
+from contin.shown import COLUMNS
 
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
 _CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)
@@ -40,8 +41,6 @@ _AREA = {"*": 90, "": 30}
 _DOT = 9
 #: A click within this distance of a point, in points of the screen, is on it: as near as a hand aims.
 _NEAR = 5
-#: Columns that a click shows at most: the box stays small.
-_MOST_COLUMNS = 8
 
 
 def plot(
@@ -144,10 +143,10 @@ def said(point: Point, number: int) -> str:
     head = heading(point)
     lines = [f"point {number}{': ' * bool(head)}{head}"]
     columns = {**point.parameters, **point.functionals}
-    for name, value in list(columns.items())[:_MOST_COLUMNS]:
+    for name, value in list(columns.items())[:COLUMNS]:
         error = point.errors.get(name, np.nan)
         lines.append(f"{name} = {value:.10g}" + (f" ± {error:.0e}" if np.isfinite(error) else ""))
-    lines += ["..."] * (len(columns) > _MOST_COLUMNS)
+    lines += ["..."] * (len(columns) > COLUMNS)
     return "\n".join(lines + [f"index {point.index}"] * (point.index is not None))
 
 

@@ -24,14 +24,12 @@ from contin.results.axes import Axes
 from contin.results.profile import Profile
 from contin.results.record import Record
 from contin.results.sensitivity import sensitivities
+from contin.shown import COLUMNS
 
 if TYPE_CHECKING:
     from contin.cycles.floquet import Floquet
     from contin.results.phase_response import PhaseResponse
     from contin.results.spectrum import Spectrum
-
-#: So many columns stand in the representation of a point.
-_SHOWN = 8
 
 
 def underlying(point: Point) -> Point:
@@ -125,8 +123,8 @@ class Point(Record):
 
     def __repr__(self) -> str:
         columns = {**self.parameters, **self.functionals}
-        values = ", ".join(f"{name}={value:.6g}" for name, value in list(columns.items())[:_SHOWN])
-        more = ", ..." if len(columns) > _SHOWN else ""
+        values = ", ".join(f"{name}={value:.6g}" for name, value in list(columns.items())[:COLUMNS])
+        more = ", ..." if len(columns) > COLUMNS else ""
         return f"Point({' '.join(filter(None, (self.label, self.name)))}{': ' * bool(self.label)}{values}{more})"
 
     def _repr_html_(self) -> str:

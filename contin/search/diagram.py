@@ -32,7 +32,7 @@ from contin.results.record import system_of
 from contin.search.cycle_starts import switched, switches
 from contin.search.further import Search, Searched, Site
 from contin.search.images import Symmetry, are_one, check_maps, image, seen
-from contin.shown import shown
+from contin.shown import ROWS, shown
 
 
 @dataclass
@@ -51,10 +51,6 @@ class Junction:
     also: list[Point] = field(default_factory=list)
 
     __repr__ = shown
-
-
-#: Branches that the text of a diagram shows: it fits on a screen.
-_SHOWN = 20
 
 
 @dataclass
@@ -76,17 +72,17 @@ class Diagram:
 
     def __repr__(self) -> str:
         count, junctions = len(self.branches), len(self.junctions)
-        lines = [f"  {number}: {branch!r}" for number, branch in enumerate(self.branches[:_SHOWN])]
-        if count > _SHOWN:
-            lines.append(f"  ... {count - _SHOWN} more")
+        lines = [f"  {number}: {branch!r}" for number, branch in enumerate(self.branches[:ROWS])]
+        if count > ROWS:
+            lines.append(f"  ... {count - ROWS} more")
         head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
         return "\n".join([head, *lines, *self._told()])
 
     def _told(self) -> list[str]:
         """Return what the searches say, as lines of text."""
-        more = [f"  ... {len(self.searches) - _SHOWN} more searches"] * (len(self.searches) > _SHOWN)
+        more = [f"  ... {len(self.searches) - ROWS} more searches"] * (len(self.searches) > ROWS)
         caution = ["  What no guess leads to is not found: there may be further solutions."] * bool(self.searches)
-        return [*(f"  {each!r}" for each in self.searches[:_SHOWN]), *more, *caution]
+        return [*(f"  {each!r}" for each in self.searches[:ROWS]), *more, *caution]
 
     @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:

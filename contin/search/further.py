@@ -28,7 +28,7 @@ from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import APART, LOCATED
 from contin.names import exact_text
-from contin.problems.statement import declared
+from contin.problems.statement import MOST_CONDITIONS, declared
 from contin.results.point import Point
 from contin.results.record import system_of
 from contin.search.deflation import deflated
@@ -46,8 +46,6 @@ _WAVES = 4
 _SIZES = (1.0, 3.0)
 #: Usual draws of each size. With four, one of these 28 searches missed a solution.
 _DRAWS = 8
-#: Most values, draws and solutions: bounds for what users give.
-_MOST = 100_000
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ class Search:
         checks.sequence("guesses", self.guesses, "guesses, as solve takes them")
         check_maps("maps", self.maps)
         for name, low in (("draws", 0), ("most", 1), ("seed", 0)):
-            checks.whole(name, getattr(self, name), low, _MOST)
+            checks.whole(name, getattr(self, name), low, MOST_CONDITIONS)
 
 
 @dataclass

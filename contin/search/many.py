@@ -16,12 +16,11 @@ from contin.boundary.statement import BoundaryValueProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ContinError, ProblemError
 from contin.shown import shown
+from contin.threads import MOST
 
 #: Sets of values that a process takes at a time: handing over takes .03 ms a set, .1 ms one at a time. With ten times more,
 #: some processes wait for others at the end.
 _TOGETHER = 4
-#: Most processes: a bound for what users give.
-_MOST = 1024
 #: Problems that a process of a cluster keeps, with the recordings of their functions.
 _KEPT = 8
 
@@ -81,7 +80,7 @@ def batch(
     if hasattr(workers, "submit"):
         job = functools.partial(_sent, function, pickle.dumps(problem))
         return list(_gathered([(workers.submit(job, each), each) for each in jobs]))
-    checks.whole("workers", workers, 1, _MOST)
+    checks.whole("workers", workers, 1, MOST)
     first = _rows(function, problem, jobs[0]) if jobs else []  # processes are forked with what this one has recorded
     if workers == 1 or len(jobs) < 3:
         return [*first, *(row for each in jobs[1:] for row in _rows(function, problem, each))]

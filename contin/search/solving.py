@@ -12,6 +12,7 @@ from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.basis import DEGREES
 from contin.collocation.mesh import MOST_INTERVALS, MeshControl
+from contin.continuation.first import ROUNDS_OF_MESHES
 from contin.core.newton import Corrected, Newton, approached, correct
 from contin.core.settling import ROUNDS
 from contin.core.system import System
@@ -24,9 +25,6 @@ from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
 from contin.search.deflation import correct_away
 from contin.search.guess import Guess, Options, first_guess, restated
-
-#: Rounds of correcting and adapting the mesh; each settles most of what is left.
-_ROUNDS = 4
 
 
 @checks.arguments
@@ -117,7 +115,7 @@ def solved(
     def corrected(system: System, x: Array) -> Corrected:
         return _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
 
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS_OF_MESHES):
         done = corrected(system, x)
         if control.every:
             system, done = _on_switches(system, done, corrected)

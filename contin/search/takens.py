@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from contin.arrays import Array
+from contin.collocation.degree import CYCLE_DEGREE
 from contin.connections.statement import ConnectionProblem
 from contin.connections.system import ConnectionCollocation
 from contin.equilibria.system import Algebraic
@@ -27,8 +28,6 @@ from contin.problems.own_names import TIME
 
 #: Intervals of the first mesh; it is adapted in any case.
 _INTERVALS = 40
-#: Its degree: that of cycles.
-_DEGREE = 4
 #: Half of the time, in units of 1 / size: cut off there, the orbit ends at a distance of 2e-5 of its size from the saddle.
 _HALF = 7.0
 
@@ -110,7 +109,7 @@ class Takens:
 
     def orbit(self, size: float) -> tuple[Array, Array, Array]:
         """Return times from 0 to 1, the states of the homoclinic orbit there (K, n), and the two parameters."""
-        s = np.linspace(-_HALF, _HALF, _INTERVALS * _DEGREE + 1)
+        s = np.linspace(-_HALF, _HALF, _INTERVALS * CYCLE_DEGREE + 1)
         w = size**2 / self.a * (2 - 6 / np.cosh(s) ** 2)
         z = 12 * size**3 / self.a * np.sinh(s) / np.cosh(s) ** 3
         states = self._states(size, w, z)
@@ -141,7 +140,7 @@ class Takens:
         )
         saddle = self._states(size, np.array([2 * size**2 / self.a]), np.zeros(1))[0]
         parameters = {**known, **dict(zip(free, values)), TIME: 2 * _HALF / size, **dict(zip(problem.multipliers, saddle))}
-        system = ConnectionCollocation(problem, times[::_DEGREE], _DEGREE, (*free, *problem.multipliers), parameters)
+        system = ConnectionCollocation(problem, times[::CYCLE_DEGREE], CYCLE_DEGREE, (*free, *problem.multipliers), parameters)
         evenly = np.stack([np.interp(system.nodes, times, column) for column in states.T], axis=1)
         x = system.pack(evenly, parameters)
         rest = {**parameters, **known, **dict(zip(problem.multipliers, self.x[: self.n]))}
