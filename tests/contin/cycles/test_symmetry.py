@@ -141,7 +141,7 @@ def test_the_angle_is_that_of_the_whole_round():
 @pytest.mark.parametrize(
     ("symmetry", "words"),
     [
-        ([1, -1], "symmetry: the field does not have it; the rate of x at S u differs by .* for u = "),
+        ([1, -1], "symmetry: the field does not have it; the rate of . at S u differs by .* for u = "),
         ([-1], r"symmetry: \[-1\] must be 2 signs, or a matrix of 2 rows and columns"),
         ("odd", "symmetry: 'odd' must be 2 signs"),
         ([1, 1], "symmetry: the identity is none; leave it out"),
