@@ -5,13 +5,13 @@ A level is relative to the size of the terms that a number is computed from, or 
 the level of the worse of its numbers. A tolerance of one file needs a measurement that shows that no level will do.
 """
 
-import numpy as np
+import sys
 
 #: The smallest number of full precision: it stands for zero in logarithms and in what is divided by.
-TINY = float(np.finfo(float).tiny)
+TINY = sys.float_info.min
 #: Round-off of a number: a parameter that differs by no more is the same at two points, and no error is given as less. It is 16
 #: units in the last place, as sums over a mesh lose a digit.
-LAST_PLACES = 16 * float(np.finfo(float).eps)
+LAST_PLACES = 16 * sys.float_info.epsilon
 #: What a solution of linear equations or a sum over many terms leaves of zero: 1e-16 to 1e-15 in tangents of canard explosions,
 #: 1e-15 in eigenvalues of chains of masses.
 ROUND_OFF = 1e-14

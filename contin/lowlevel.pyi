@@ -1,4 +1,5 @@
 # The names of `contin.lowlevel`, and where they come from.
+from . import levels
 from .boundary.second_variation import Undetermined
 from .boundary.system import Collocation
 from .collocation.basis import basis, interpolation
@@ -33,6 +34,6 @@ __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",
     "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
     "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
-    "interpolation", "least", "locate_branch_point", "minimum", "oscillation", "point_of", "read_columns", "root", "shown",
+    "interpolation", "least", "levels", "locate_branch_point", "minimum", "oscillation", "point_of", "read_columns", "root", "shown",
     "temporary_name", "through", "write_whole",
 ]  # fmt: skip

@@ -15,22 +15,19 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ribbon_model.descent import KICK, LONGEST, descend, modes
+from contin.lowlevel import levels
+from ribbon_model.descent import KICK, LONGEST, SEGMENTS, descend, modes
 from ribbon_model.second_variation import Equilibrium
 from ribbon_model.segments import Chain, Strip, discretized
 
-#: Segments to begin with, and at most: their number is doubled where both ways down lead to the same state, because the saddle
-#: of the segments lies further from that of the continuous strip than the kick leads.
-SEGMENTS, _MOST = 96, 400
 #: The kick of open strips: root mean square change of the strains, over one over the length.
 KICK_OPEN = 2 * math.pi * KICK
 #: Times that a strip which rests in a saddle is kicked out of it.
 _KICKS = 5
 #: Root mean square difference of the strains, relative to that of one, of two states of an open strip at rest.
 _APART = 1e-3
-#: Difference of the strains from those of a circle, and of energies of the same state on the same segments, at rest.
-_PLANAR, _SAME = 1e-6, 1e-6
-#: The same where one of the two is the continuous state cut into segments, which are not quite at rest.
+#: Relative difference of the energies of a state at rest and of the continuous state cut into segments, which are not quite at
+#: rest.
 _CUT = 1e-4
 
 Name = TypeVar("Name")
@@ -58,7 +55,7 @@ def sides(saddle: Equilibrium) -> tuple[Strip, Strip] | None:
     """Return the strips at rest on both sides of a state of index 1; None where they cannot be told apart."""
 
     def apart(first: Strip, last: Strip) -> bool:
-        return abs(first.energy - last.energy) > _SAME * (1 + abs(first.energy))
+        return abs(first.energy - last.energy) > levels.APART * (1 + abs(first.energy))
 
     return ways_down(lambda segments: discretized(saddle, segments), apart, KICK)
 
@@ -77,15 +74,15 @@ def ways_down(
     kick, longest : float
         Root mean square change of the strains by which the state is left, and the largest one in a step.
     """
-    segments = SEGMENTS
-    while segments <= _MOST:
+    # Both ways down lead to the same state where the saddle of the segments lies further from that of the continuous strip than
+    # the kick leads.
+    for segments in (SEGMENTS, 2 * SEGMENTS, 4 * SEGMENTS):
         strip = cut(segments)
         mode = modes(strip, 1)[1][:, 0]
         ways = [descend(strip.moved(sign * kick * mode), longest=longest) for sign in (1, -1)]
         first, last = (way.end for way in ways)
         if all(way.rests for way in ways) and apart(first, last):
             return first, last
-        segments *= 2
     return None
 
 
@@ -112,7 +109,7 @@ def apart(first: Chain, last: Chain) -> bool:
 def covering_index(strip: Strip) -> int | None:
     """Return the covering index of a strip that is a planar circle (negative if turned inside out), None for all others."""
     mean = float(strip.strains[:, 0].mean())
-    return round(mean) if np.abs(strip.strains - [mean, 0, 0]).max() < _PLANAR else None
+    return round(mean) if np.abs(strip.strains - [mean, 0, 0]).max() < levels.APART else None
 
 
 def is_at(strip: Strip, state: Equilibrium) -> bool:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contin import Point
-from contin.lowlevel import Collocation, correct, point_of
+from contin.lowlevel import Collocation, correct, levels, point_of
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, FREE, PLACE, End
 from ribbon_model.loads import FORCES, STROKE
@@ -26,12 +26,6 @@ from ribbon_model.open_strip import OpenStrip
 
 if TYPE_CHECKING:
     from ribbon_model.network import Network
-
-#: A condition at the ends that is missed by less, relative to 1 + the largest force or moment there, holds: states are known
-#: to 1e-9 and better.
-_HOLDS = 1e-6
-#: A prescribed number that differs from that of the state by less is kept: the state has it up to round-off.
-_SAME = 1e-9
 
 
 def with_ends(strip: OpenStrip, point: Point, follow: str, numbers: Mapping[str, float] | None = None):
@@ -68,7 +62,7 @@ def _values(strip: OpenStrip, before: Mapping[str, float], last: np.ndarray) -> 
     stroke = values.get(STROKE, 0.0)
     place = dict(zip(PLACE, last[4:7] - stroke * np.array(strip.stroke_direction)))
     values |= {
-        name: before[name] if abs(before.get(name, math.inf) - x) < _SAME else float(x)
+        name: before[name] if abs(before.get(name, math.inf) - x) < levels.LOCATED else float(x)
         for name, x in place.items() if name in values
     }  # fmt: skip
     if finish.rotation == FREE:
@@ -79,7 +73,10 @@ def _values(strip: OpenStrip, before: Mapping[str, float], last: np.ndarray) -> 
 
 def held_angles(end: End, q, known: Sequence[float] | None) -> tuple[float, ...]:
     """Return turn, bend and swing that an end with a quaternion has: the known ones where they hold it so, or next to them."""
-    if known is not None and max(map(abs, ends.rotation_conditions(end)(q, ends.prescribed(*known))), default=0.0) < _SAME:
+    if (
+        known is not None
+        and max(map(abs, ends.rotation_conditions(end)(q, ends.prescribed(*known))), default=0.0) < levels.LOCATED
+    ):
         return tuple(known)
     return angles_near(q, known or (0.0, 0.0, 0.0))
 
@@ -121,9 +118,9 @@ def balanced(
     problem = strip.problem
     values, left = fitted(strip, states, values, [*replacing, *problem.multipliers])
     conditions = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
-    if left[:conditions].max(initial=0.0) > _HOLDS:
+    if left[:conditions].max(initial=0.0) > levels.APART:
         raise ValueError("they hold a place or a rotation that the state does not have (the first end has moved or turned)")
-    if left[conditions:].max(initial=0.0) > _HOLDS * (1 + np.abs(states[[0, -1], states.shape[1] // 2 :]).max()):
+    if left[conditions:].max(initial=0.0) > levels.APART * (1 + np.abs(states[[0, -1], states.shape[1] // 2 :]).max()):
         raise ValueError(unbalanced)
     return values
 

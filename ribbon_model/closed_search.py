@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from contin import ContinError, MeshControl, Point, solve
+from contin.lowlevel import levels
 from ribbon_model.domains import HALF_LOOPS, Domain
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, on_directors, spin
 from ribbon_model.law import Law
@@ -29,23 +30,16 @@ from ribbon_model.solution import Solution
 _STEPS = 120
 #: Damped Newton steps from each draw. Of those that close after 60, four of five have closed after 30.
 _ITERATIONS = 30
-#: What a strip misses at the other end, in units of L / 2 pi, below which it is solved again: the error of `_STEPS` is 1e-4 for
-#: strips with six waves.
-_CLOSED = 1e-6
 #: First damping, relative to the diagonal of the normal equations; its change after a success and a failure.
 _DAMPING, _LESS, _MORE = 1e-2, 0.1, 5.0
 #: Longest step, relative to 1 + the largest load.
 _LONGEST = 0.5
-#: Change of a load for differences, relative to 1 + its size: the square root of round-off, times 100.
-_CHANGE = 1e-6
-#: Two states whose kappa* and energy differ by less, relative to 1 + their size, are one up to symmetry.
-_SAME = 1e-6
 #: Mesh on which a strip is solved again, before it is adapted.
 _INTERVALS, _DEGREE = 24, 5
 #: How far that mesh is adapted: strips with more waves than these intervals resolve are left out.
 _MESH = MeshControl(1e-9, 8, 200)
-#: Places of a half loop at which omega_1 is looked at to count waves, and the part of the largest cosine that counts as zero.
-_PLACES, _SMOOTH = 256, 1e-6
+#: Places of a half loop at which omega_1 is looked at to count waves.
+_PLACES = 256
 #: Moment and force at S = 0.
 _LOADS = ("M1", "M2", "M3", "R1", "R2", "R3")
 
@@ -112,7 +106,7 @@ def further(
 
 def is_known(place: tuple[float, float], known: Sequence[tuple[float, float]]) -> bool:
     """Return whether kappa* and energy are those of a known state."""
-    return any(all(abs(a - b) <= _SAME * (1 + abs(b)) for a, b in zip(place, other)) for other in known)
+    return any(all(abs(a - b) <= levels.APART * (1 + abs(b)) for a, b in zip(place, other)) for other in known)
 
 
 def is_odd(solution: Solution) -> bool:
@@ -126,7 +120,7 @@ def waves(solution: Solution) -> int:
     t = np.linspace(0, 1, _PLACES + 1)
     strains = dataclasses.replace(solution, t=t, states=solution.sampled(t)[:, : solution.states.shape[1]]).strains()
     cosines = np.abs(np.fft.rfft(np.append(strains[:, 0], strains[-2:0:-1, 0])).real)  # omega_1 is even about both ends
-    found = math.gcd(*(int(j) for j in np.flatnonzero(cosines > _SMOOTH * cosines.max()) if j))
+    found = math.gcd(*(int(j) for j in np.flatnonzero(cosines > levels.APART * cosines.max()) if j))
     return found or 1
 
 
@@ -146,7 +140,7 @@ class _Shooting:
             path = self.integrated(loads)
             sizes = np.abs(self._missed(path[-1])).max(axis=1)
         for number in np.argsort(sizes, kind="stable"):
-            if sizes[number] <= _CLOSED:
+            if sizes[number] <= levels.APART:
                 yield loads[number], path[:, number]
 
     def integrated(self, loads: np.ndarray) -> np.ndarray:
@@ -181,7 +175,7 @@ class _Shooting:
         count = loads.shape[1]
         damping, missed = np.full(len(loads), _DAMPING), self._missed(self.integrated(loads)[-1])
         for _ in range(_ITERATIONS):
-            change = _CHANGE * (1 + np.abs(loads))
+            change = levels.APART * (1 + np.abs(loads))
             beside = (loads[:, None] + change[:, :, None] * np.eye(count)).reshape(-1, count)
             slopes = self._missed(self.integrated(beside)[-1]).reshape(-1, count, count) - missed[:, None]
             slopes = slopes / change[:, :, None]  # [strip, load, condition]

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from contin.lowlevel import correct, eigenbasis
+from contin.lowlevel import correct, eigenbasis, levels
 from ribbon_model import exact, second_variation
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
@@ -46,10 +46,7 @@ LONGEST = 0.1
 SEGMENTS = 96
 
 _FASTEST = 1e8  # largest time step: Newton's method
-_ROUND_OFF = 1e-14  # of the energy
 _PAIRED = 2  # further modes computed: the last one asked for may be one of a pair, or of three
-_PLANAR = 1e-6  # difference of strains from those of a circle
-_SAME = 1e-6  # of energy and kappa*: the same equilibrium
 _COVERINGS = range(1, 10, 2)  # of the primary branches on which an equilibrium is searched
 
 
@@ -204,7 +201,7 @@ def _step(strip: Strip, tangent: _Tangent, metric, dt: float, longest: float) ->
             fall = strip.energy - ahead.energy
         except ValueError:
             fall = -math.inf
-        noise = _ROUND_OFF * (1 + abs(strip.energy))
+        noise = levels.ROUND_OFF * (1 + abs(strip.energy))
         if expected < noise and fall > -noise or 0.5 < fall / expected < 2:
             return ahead, dt
         dt /= 4
@@ -300,7 +297,7 @@ def identify(strip: Strip) -> Rest:
         The energy is not convex in the strains at that equilibrium, so there is no index.
     """
     law, parameters, kappa_n, strains = strip.law, strip.parameters, strip.kappa_n, strip.strains
-    if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < _PLANAR:
+    if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < levels.APART:
         m = round(strains[:, 0].mean())
         # a strip that is turned inside out is, seen from the other side, one with the opposite natural curvature
         sense = math.copysign(1, m)
@@ -315,7 +312,7 @@ def identify(strip: Strip) -> Rest:
     n = int(np.argmax(np.abs(np.fft.rfft(strains[:, 2]))))
     for m, point in _on_primary_branches(strip, n):
         difference = float(np.abs(values[1] - [point.energy, point.kappa_star]).max())
-        if difference < _SAME:
+        if difference < levels.APART:
             return Rest("primary branch", m, n, *map(float, values[1]), error, difference, stability)
     return Rest("unknown", 0, n, *map(float, values[1]), error, math.nan, stability)
 

@@ -20,13 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin import BoundaryValueProblem
-from contin.lowlevel import Collocation
+from contin.lowlevel import Collocation, levels
 from ribbon_model.equilibrium import LENGTH, directors, with_force, without_force
 from ribbon_model.law import Law
 from ribbon_model.shape import Shape
-
-#: With a smaller |sin| of half the angle between two waves, these are not rotated against each other, and there is no centre.
-_NO_TURN = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +133,9 @@ class Cell(Domain):
         axis = p["sense"] * np.array([p["M1"], p["M2"], 0.0])
         axis /= np.linalg.norm(axis)
         angle, centre = 4 * p["turn"], np.zeros(3)
-        if abs(math.sin(angle / 2)) > _NO_TURN:  # where the two-fold axis (through x along d2) meets the plane of the mirror
+        if (
+            abs(math.sin(angle / 2)) > levels.LOCATED
+        ):  # where the two-fold axis (through x along d2) meets the plane of the mirror
             d2, x, normal = part.directors[-1, 1], part.centreline[-1], part.directors[0, 2]
             centre = x - d2 * (x @ normal) / (d2 @ normal)
         return self.unfold(part).repeated(self.wavenumber(p), axis, centre, angle)

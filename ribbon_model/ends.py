@@ -22,6 +22,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from contin.lowlevel import levels
 from ribbon_model.equilibrium import directors
 
 #: Directions by name, as unit vectors on the lab axes.
@@ -32,10 +33,6 @@ PLACE, ANGLES = ("shear", "rise", "distance"), ("turn", "bend", "swing")
 CLAMPED, HINGED, JOINT, FREE = "clamped", "hinged", "joint", "free"
 #: A part of a unit vector below this is zero.
 LOOSE = 1e-9
-#: A vector whose length differs from one by less has length one: it was divided by its length before.
-_ONE = 1e-15
-#: A vector shorter than this has no direction.
-_SHORT = 1e-9
 
 Vector = tuple[float, float, float]
 
@@ -50,9 +47,9 @@ def unit(what: str, vector) -> Vector:
     """
     values = tuple(float(value) for value in vector)
     length = math.sqrt(sum(value * value for value in values))
-    if len(values) != 3 or not _SHORT < length < math.inf:
+    if len(values) != 3 or not levels.LOCATED < length < math.inf:
         raise ValueError(f"{what}: {list(vector)} must be three numbers, not all zero")
-    if abs(length - 1) < _ONE:
+    if abs(length - 1) < levels.LAST_PLACES:
         return values  # type: ignore[return-value]
     return tuple(value / length for value in values)  # type: ignore[return-value]
 

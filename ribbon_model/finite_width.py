@@ -28,6 +28,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from contin.lowlevel import levels
+
 #: Below this x**4 the first pole of g and a series are used, of which `_TERMS` terms leave 1e-16 of g and 2e-14 of its fourth
 #: derivative. The closed form loses 1e-13 of the fourth derivative there, and ten times more at 16.
 SERIES_LIMIT = 64.0
@@ -204,7 +206,7 @@ def ribbon_strains(M1, M3, kappa_n, section: Plate):
     a = np.where(p > 0, (p + root) / 2, m3 * m3 / (2 * (root - p) + 1e-300))
     eta, c = m3 / (2 * a + 1e-300), nu * kappa_n + a
     w1 = c / (1 + eta * eta)
-    return w1 / stiff, eta * w1 / np.sqrt(stiff), (a > _LEAST * root) & (c > 0)
+    return w1 / stiff, eta * w1 / np.sqrt(stiff), (a > levels.CORRECTED * root) & (c > 0)
 
 
 def start(M1, M3, kappa_n, section: Plate, narrow=False):
@@ -237,8 +239,6 @@ def flat_rod_strains(M1, M3, kappa_n, section: Plate):
     return kappa_n + M1 / section.plane, M3 / (2 * section.twist)
 
 
-#: Part of the moment below which the ribbon's a is round-off; it has no bending then.
-_LEAST = 1e-12
 #: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has.
 #: With two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
 _ROUNDS = 2

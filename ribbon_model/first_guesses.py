@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from ribbon_model import ends
 from ribbon_model.ends import FREE, HINGED, JOINT, LOOSE, End
@@ -14,8 +15,6 @@ Guess = Callable[[float], list[float]]
 
 #: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
 _STEEPEST = 2.4
-#: Halvings of the interval in which its amplitude is looked for: to round-off. Ten times more change nothing.
-_HALVINGS = 50
 
 
 def arch(start: End, finish: End, distance: float, side: float = 1.0) -> Guess:
@@ -40,10 +39,7 @@ def arch(start: End, finish: End, distance: float, side: float = 1.0) -> Guess:
     least = float(np.mean(np.cos(_STEEPEST * mode_values)))
     if not least < distance <= 1:
         raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
-    amplitude, change = 0.0, _STEEPEST
-    for _ in range(_HALVINGS):  # the distance falls with the amplitude
-        change /= 2
-        amplitude += change if np.mean(np.cos((amplitude + change) * mode_values)) > distance else 0.0
+    amplitude = brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0.0, _STEEPEST)  # it falls
     angle = side * amplitude * mode_values
     steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
     place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])

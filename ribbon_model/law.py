@@ -20,12 +20,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
-from contin.lowlevel import shown
+from contin.lowlevel import levels, shown
 from ribbon_model.older import takes_parameters
-
-#: Derivatives that a law without coupling does not have, relative to the sum of the moduli: they are zeros or round-off.
-_COUPLED = 1e-9
-
 
 #: Names that strips have already; a law's parameter of such a name would take their place, or they its.
 RESERVED = frozenset((
@@ -363,7 +359,7 @@ class Law:
         U, slopes, curvatures = self.derivatives(strain, kappa_n, *values)
         sizes = np.abs(np.diagonal(curvatures, axis1=-2, axis2=-1)[..., :3]).sum(axis=-1)
         mixed = (curvatures[..., i, j] for i, j in ((0, 1), (0, 2), (1, 2)))
-        if np.any(np.abs(np.stack([slopes[..., 1], slopes[..., 2], *mixed])) > _COUPLED * sizes):
+        if np.any(np.abs(np.stack([slopes[..., 1], slopes[..., 2], *mixed])) > levels.LOCATED * sizes):
             raise ValueError(f"the law {self.name!r} couples bending and twisting on a circle: it has no linear theory")
         moduli = np.diagonal(curvatures, axis1=-2, axis2=-1)
         found = (slopes[..., 0], U, -slopes[..., 3], moduli[..., 0], moduli[..., 1], moduli[..., 2])

@@ -17,6 +17,7 @@ import numpy as np
 
 from contin import Event
 from contin.lowlevel import Collocation, Continuation, Label, Trial
+from contin.lowlevel import levels
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.law import Law
 
@@ -26,14 +27,10 @@ if TYPE_CHECKING:  # closed strips need no sections
 Strains = Callable[[Collocation, np.ndarray], np.ndarray]
 
 #: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
-_NEARLY_ENDED = 0.1
-#: The margin is relative to the largest moment, or to this where there is none.
-_LEAST = 1e-9
+NEARLY_ENDED = 0.1
 #: Rounds in which the least margin of a ribbon is sought between nodes. Each divides the distance of places by 8, so the error
 #: of a smooth minimum falls by 64: from h**2 at the nodes to h**2/2.6e5. One less: 64 times that.
 _ROUNDS = 3
-#: Places of a round, from one neighbour of the lowest place to the other.
-_PLACES = 17
 
 
 #: Parts of a line between strains at neighbouring nodes. U is concave on a tenth of a jump at least (measured on (3, 1)).
@@ -117,7 +114,7 @@ def explained(section: Section, tests: Sequence[Event], run: Continuation) -> st
     """Return that a run met the end of the law, or failed near it, in a sentence; None for a run that stopped elsewhere."""
     for test in tests:
         state, met = run.state, run.stop is not None and run.stop.event == test.name
-        if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
+        if met or test.function(Trial.without_tangent(state.system, state.x)) < NEARLY_ENDED:
             return f"{test.name}, {section.form.ends}"
     return None
 
@@ -134,7 +131,7 @@ def at_guess(section: Section, times: np.ndarray, frames: np.ndarray) -> str | N
     if not section.form.has_rulings:
         return None
     bending = strains_of((frames[1:] + frames[:-1]) / 2, np.diff(frames, axis=0) / np.diff(times)[:, None])[:, 0]
-    if bending.min() > _LEAST * abs(bending).max():
+    if bending.min() > levels.LOCATED * abs(bending).max():
         return None
     return (
         f"the law {section.law.name!r} has no value where the bending vanishes or is negative, as in this first state; take "
@@ -157,10 +154,10 @@ def _least_margin(section: Section, place: Place, trial: Trial) -> float:
 
     times = system.nodes
     values = margins(times)
-    size, least = max(abs(values).max(), _LEAST), values.min()
+    size, least = max(abs(values).max(), levels.LOCATED), values.min()
     for _ in range(_ROUNDS):
         lowest = int(values.argmin())
-        times = np.linspace(times[max(lowest - 1, 0)], times[min(lowest + 1, len(times) - 1)], _PLACES)
+        times = np.linspace(times[max(lowest - 1, 0)], times[min(lowest + 1, len(times) - 1)], _PARTS + 1)
         values = margins(times)
         least = min(least, values.min())
     return float(least / size)

@@ -27,11 +27,18 @@ from ribbon_model.older import takes_parameters
 _NEAREST = 1e-5
 #: Largest one: a law without an end up to there counts as regular.
 _FARTHEST = 1e4
-#: Places between these: 400 a decade. Two zeros nearer to each other than 0.6 % of their distance from the natural state are
-#: missed; with ten times fewer places, 6 %.
-_PLACES = 3601
+#: Places in a decade at which a zero is looked for: two nearer to each other than 0.6 % of their distance from the natural
+#: state are missed; with ten times fewer places, 6 %.
+_PLACES = 400
 #: Largest covering index that a circle is compared with; scenes allow 1000 and wavenumbers up to 1000.
 _MOST_COVERED = 3000
+
+
+def places_between(low, high):
+    """Return places from ``low`` to ``high``, evenly spaced in the logarithm, at which zeros are looked for."""
+    import numpy as np
+
+    return np.geomspace(low, high, math.ceil(_PLACES * abs(math.log10(high / low))) + 1)
 
 
 @takes_parameters
@@ -123,7 +130,7 @@ def _sides(law: Law, m: int, values: tuple) -> tuple:
 
     found = []
     for sign in (-1, 1):
-        places = m + sign * abs(m) * np.append(0.0, np.geomspace(_NEAREST, _FARTHEST, _PLACES))
+        places = m + sign * abs(m) * np.append(0.0, places_between(_NEAREST, _FARTHEST))
         beyond, limit = np.flatnonzero(~(least(places) > 0)), sign * math.inf
         if beyond.size:
             first = beyond[0]

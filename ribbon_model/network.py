@@ -41,6 +41,7 @@ from contin import (
 )
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
+from contin.lowlevel import levels
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.members import (
@@ -85,8 +86,6 @@ UNDETERMINED = (
 _MESH = MeshControl(1e-9, max_intervals=200)
 #: A state that Newton's method finds is that of the drawing if it is nearer than this; others may be anywhere.
 _NEAR = 0.3
-#: An eigenvalue of the second variation below this part of the largest is zero; see `ribbon_model.open_strip`.
-_ZERO = 1e-10
 
 
 class OutOfReach(ProblemError):
@@ -619,7 +618,7 @@ class Network:
         if not self.problem.has_index:
             return point
         sizes = np.abs(point.second_variation().eigenvalues)
-        if sizes.size and not sizes.min() > _ZERO * sizes.max():
+        if sizes.size and not sizes.min() > levels.DEPENDENT * sizes.max():
             raise ProblemError(MECHANISM)
         return point
 

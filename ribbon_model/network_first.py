@@ -14,15 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contin import ContinError, Point
+from ribbon_model.descent import SEGMENTS
 from ribbon_model.network import ASSEMBLY, Network, OutOfReach
 from ribbon_model.shape import quaternions
 
 if TYPE_CHECKING:
     from ribbon_model.network_segments import Piece
-
-#: Segments of all members together. Half as many leave Newton's method too far from some states, twice as many take four times
-#: as long.
-_SEGMENTS = 96
 
 
 def first_state(network: Network, intervals: int = 10, degree: int = 6, **options) -> tuple[Point, str]:
@@ -54,7 +51,7 @@ def downhill(network: Network, point: Point) -> list:
     """
     from ribbon_model import descent, network_segments  # SciPy, which other first states do not need
 
-    drawing = network_segments.cut(network, point.system, point.x, _SEGMENTS)
+    drawing = network_segments.cut(network, point.system, point.x, SEGMENTS)
     chain = replace(drawing, numbers={**drawing.numbers, ASSEMBLY: 1.0}).moved(np.zeros(drawing.size))
     way = descent.descend(chain, longest=descent.LONGEST / max(member.length for member in network.members.values()))
     if not way.rests:

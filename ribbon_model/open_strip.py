@@ -20,7 +20,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
-from contin.lowlevel import Collocation, Continuation, Undetermined, shown
+from contin.lowlevel import Collocation, Continuation, Undetermined, levels, shown
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
@@ -34,9 +34,6 @@ from ribbon_model.shape import Shape, shape_of
 REACTIONS = tuple(
     f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
 )  # fmt: skip
-#: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
-#: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
-_ZERO = 1e-10
 #: Most phases of a strip: it can shift and turn about itself.
 _MOST_PHASES = 2
 
@@ -359,7 +356,7 @@ class OpenStrip:
         """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
         try:
             sizes = np.abs(point.second_variation().eigenvalues)
-            if not sizes.size or sizes.min() > _ZERO * sizes.max():
+            if not sizes.size or sizes.min() > levels.DEPENDENT * sizes.max():
                 return
         except ProblemError as error:
             reason = self._reason(error)

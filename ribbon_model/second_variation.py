@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, interpolation, shown
+from contin.lowlevel import basis, interpolation, levels, shown
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
@@ -35,9 +35,8 @@ _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 #: Degree on the mesh of a circle, and the phase in radians by which the highest wave of interest turns on an interval: there
 #: the error of 8 Gauss points is (8! / 16!)^2 2^17 / 17 = 3e-14. With ten times the phase the wave would not be resolved.
 _CIRCLE_DEGREE, _PHASE = 8, 2.0
-#: Length, relative to the loop, and winding may be off by this much. A guess near a branch has some defect; half a turn more
-#: would be another winding number.
-_LENGTH_DEFECT, _WINDING_DEFECT = 1e-6, 0.25
+#: The winding may be off by this much. A guess near a branch has some defect; half a turn more would be another winding number.
+_WINDING_DEFECT = 0.25
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ def _unfolded_cell(sample, length):
     """Return lab axes, directors and symmetry of a quarter wave: its image under the axis d2 at its end, then half waves."""
     first, last = sample(np.array([0.0, 1.0]))
     normal = np.cross(first[2], last[1])
-    if np.linalg.norm(normal) < 1e-6:  # no rotation from part to part, so any axis in the mirror plane can be taken
+    if np.linalg.norm(normal) < levels.APART:  # no rotation from part to part, so any axis in the mirror plane can be taken
         normal = first[0]
     normal /= np.linalg.norm(normal)
     axes = np.array([first[2], np.cross(normal, first[2]), normal])
@@ -212,7 +211,7 @@ def _unfolded_cell(sample, length):
     turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
     part, order = 2 * length, round(LENGTH / (2 * length))
     winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
-    if abs(order * part / LENGTH - 1) > _LENGTH_DEFECT or abs(winding - round(winding)) > _WINDING_DEFECT:
+    if abs(order * part / LENGTH - 1) > levels.APART or abs(winding - round(winding)) > _WINDING_DEFECT:
         raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
     turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
     signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]

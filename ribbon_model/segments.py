@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from contin.lowlevel import shown
+from contin.lowlevel import levels, shown
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
@@ -24,8 +24,8 @@ from ribbon_model.shape import Shape
 
 C = TypeVar("C")
 
-#: Tolerance of the conditions that a chain meets, the most Newton steps to it, and a violation from which none leads back.
-_MET, _STEPS, _FAR = 1e-12, 12, 1.0
+#: A violation of the conditions of a chain from which no Newton step leads back.
+_FAR = 1.0
 # in powers of z = p**2: sin(p)/p, f = (1 - cos p)/p**2, 2 f', 4 f'', g = (p - sin p)/p**3, 2 g', 4 g''; exact for |p| < pi
 _SERIES = np.array([[(-1) ** k / math.factorial(2 * k + i) for k in range(15)] for i in (1, 2, 3)])
 _BY_Z = np.diag(np.arange(1.0, 15), -1)  # a row of coefficients times this gives those of the derivative
@@ -331,9 +331,9 @@ def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[
         They cannot be met nearby: ``failed``.
     """
     chain = chain._changed(change)
-    for _ in range(_STEPS):
+    for _ in range(levels.MOST_UPDATES):
         violation = np.abs(missed(chain)).max(initial=0.0)
-        if violation < _MET:
+        if violation < levels.CORRECTED:
             return chain
         if not violation < _FAR:
             break

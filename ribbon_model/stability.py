@@ -36,23 +36,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis
+from contin.lowlevel import basis, levels
 from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
 
-#: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times a condition of 100. Ten
-#: times larger, states within 1e-8 of a bifurcation would be undecided.
-_NEUTRAL = 1e-9
-#: Below this |C^T M'| the equilibrium is a circle, and a shift of phase a rigid rotation.
-_NO_MOTION = 1e-8
-#: Singular values of conditions below this are zero. They are of order 1 or round-off.
-_DEPENDENT = 1e-9
 #: The form that is eliminated is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is. Ten times
 #: smaller, Schur complements could be large, and lose digits.
 _DEFINITE = 0.2
 #: Rigid motions, and components of E.
 _RIGID = 6
-#: A gap of the closed loop above this is more than a corrector leaves.
-_CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -149,9 +140,9 @@ def index(equilibrium: Equilibrium) -> Stability:
     points = _at_gauss_points(equilibrium)
     form = _Form(equilibrium, points)
     classes = form.classes()
-    floor = max(_NEUTRAL, form.residual)
+    floor = max(levels.LOCATED, form.residual)
     reasons = []
-    if points.gap > _CLOSED:
+    if points.gap > levels.APART:
         reasons.append(f"the loop is not closed: a gap of {points.gap:.1e}")
     for entry in classes:
         nearest = entry.eigenvalues[entry.nearest]
@@ -213,7 +204,7 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
         return np.zeros(3), float(np.linalg.norm(end))
     start, middle = (np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry)))
     rows, values = np.vstack([start, middle]), np.concatenate([np.zeros(3), -middle @ end])
-    origin = np.linalg.lstsq(rows, values, rcond=_DEPENDENT)[0]
+    origin = np.linalg.lstsq(rows, values, rcond=levels.DEPENDENT)[0]
     return origin, float(np.linalg.norm(rows @ origin - values))
 
 
@@ -409,9 +400,9 @@ class _Form:
         form = form + (increments.conj().T @ (closing @ increments)).real
         rows = rows @ increments
         _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
-        out = rows[sizes > _DEPENDENT].T
+        out = rows[sizes > levels.DEPENDENT].T
         known = known - out @ (out.T @ known)
-        if np.linalg.norm(known) > _NO_MOTION:
+        if np.linalg.norm(known) > levels.DOUBLED:
             known /= np.linalg.norm(known)
             self.residual = max(self.residual, abs(float(known @ form @ known)))
             out = np.column_stack([out, known])

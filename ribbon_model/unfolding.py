@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ribbon_model import linear
 from ribbon_model.law import Law
 from ribbon_model.older import takes_parameters
 
@@ -30,8 +31,6 @@ from ribbon_model.older import takes_parameters
 FLAT = 0.01
 #: Smallest 1 - xi at which a zero of t is looked for; it is of the order of 1/Gamma of the law 'finite width'.
 _FLATTEST = 1e-7
-#: Places from 1 down to that: 300 a decade. Two zeros of t nearer than 0.8 % of 1 - xi are missed.
-_PLACES = 2101
 #: Conditions at both ends, by the number of the state in (x_1, psi_2, psi_3, M_2, M_3, R_1) that vanishes there.
 CLAMPED = (0, 1, 2)
 HINGED = (0, 2, 3)
@@ -234,7 +233,7 @@ def _zero_of_t(law: Law, values) -> float | None:
     def t(xi):
         return law.on_circle(1 - xi, 1.0, *values.values()).twisting
 
-    grid = 1 - np.geomspace(1.0, _FLATTEST, _PLACES)
+    grid = 1 - linear.places_between(1.0, _FLATTEST)
     below = np.flatnonzero(t(grid) + 0 * grid < 0)
     return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
 

@@ -6,7 +6,7 @@ import html
 import io
 
 #: Labelled points that the table lists: about a screen. The others are counted.
-_MOST_ROWS = 20
+MOST_ROWS = 20
 
 
 def to_html(branch) -> str:
@@ -22,8 +22,8 @@ def to_html(branch) -> str:
         columns[titles.get(name, name)] = table[titles[name]] if name in titles else branch.events[name].tolist()
     head = "".join(f"<th>{html.escape(title)}</th>" for title in columns)
     events = [*zip(*columns.values())]
-    rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in events[:_MOST_ROWS])
-    more = f"<p>and {len(events) - _MOST_ROWS} more labelled points</p>" if len(events) > _MOST_ROWS else ""
+    rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in events[:MOST_ROWS])
+    more = f"<p>and {len(events) - MOST_ROWS} more labelled points</p>" if len(events) > MOST_ROWS else ""
     return (
         f"<div><p><b>{html.escape(branch.about)}</b>: {len(branch.points)} points; {stop}</p>{svg}"
         f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}</div>"

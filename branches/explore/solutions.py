@@ -11,11 +11,8 @@ import numpy as np
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from contin import ConvergenceError, Newton
-from contin.lowlevel import Collocation, correct, point_of
+from contin.lowlevel import Collocation, correct, levels, point_of
 
-#: Largest residual of a kept solution with the columns of its point, relative to 1 + the largest parameter. The largest of 311
-#: solutions had 4e-13. With ten times more, columns that are wrong in the sixth digit would pass.
-_RESIDUAL = 1e-6
 #: Newton's tolerance, and the largest difference from the columns, relative to 1 + their size: shapes need four
 #: digits, and the mesh is that of a kept solution from before, which may be too coarse here for more.
 _TOLERANCE, _SAME = 1e-8, 1e-4
@@ -66,7 +63,7 @@ def _kept(branch: StoredBranch, number: int) -> Solution:
     """Return a solution that the file keeps; raise StoreError unless it solves the equations with the columns of its point."""
     system, x = branch.discretized(number)
     residual = np.abs(system.residual(x)).max()
-    if not residual <= _RESIDUAL * (1 + np.abs(system.parameters).max()):
+    if not residual <= levels.APART * (1 + np.abs(system.parameters).max()):
         raise StoreError(f"{branch.about}: point {number}: its columns are not those of its solution")
     return system, x
 

@@ -20,11 +20,10 @@ from branches.scene.labels import START, label_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.read import read_branch, read_kind
+from contin.lowlevel import levels
 
 #: Nodes of a strip. Twice as many make pages twice as large; a quarter of them shows corners where a strip bends most.
 _NODES = 97
-#: A column that varies by less, relative to 1 + its size, is constant up to round-off.
-_CONSTANT = 1e-9
 #: A read-out has room for so many columns, without a need to scroll; of more, it has the numbers and what is conjugate to them.
 _ROOM = 24
 #: Distance of the eye from the middle of a state, in units of half the frame, and the part of it that a state fills.
@@ -73,7 +72,7 @@ def gathered(files: list[Path], title: str, slow: bool = True) -> dict:
 
 
 def _varies(values: np.ndarray) -> bool:
-    return bool(np.ptp(values) > _CONSTANT * (1 + np.abs(values).max()))
+    return bool(np.ptp(values) > levels.LOCATED * (1 + np.abs(values).max()))
 
 
 def _shapes(branch: StoredBranch) -> dict:

@@ -16,7 +16,7 @@ from branches.graph.stored import CLOSED_FORMAT, COLUMNS
 from branches.scene.closed import ClosedScene, law_of
 from branches.scene.labels import PRIMARY, kind_of
 from branches.store.branch import Piece
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, levels
 from ribbon_model.linear import circle, covering
 
 #: The format of diagrams of closed strips, the title of one without, and whether there is an exact solution.
@@ -27,8 +27,6 @@ COUNTED = {
 }  # fmt: skip
 #: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
 _MEETINGS = ("secondary bifurcation", PRIMARY)
-#: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
-_SAME = 1e-6
 
 
 def part(branch, file: str, numbers: object = None) -> Part:
@@ -116,7 +114,7 @@ def _known(graph, node):
 def same_place(a: dict, b: dict) -> bool:
     """Return whether two special points agree in quantities that rigid motions and the starting point do not change."""
     columns = [column for column in COLUMNS[1:] if column in a and column in b]
-    return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
+    return all(abs(a[column] - b[column]) < levels.APART * (1 + abs(b[column])) for column in columns)
 
 
 def holds(graph, scene: ClosedScene) -> bool:

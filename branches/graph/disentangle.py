@@ -23,21 +23,21 @@ from functools import cached_property
 
 import numpy as np
 
-#: Levels between neighbouring circles, and beyond the first and the last circle. More of them cost time as their square.
-_LEVELS, _BEYOND = 8, 4
+#: Levels between neighbouring circles; half as many beyond the first and the last circle. More of them cost time as their
+#: square.
+_LEVELS = 8
 #: How often branches are placed anew while any cross, and how many at a time. The laws of Fig. 12 need 42, 15 and 0.
 _TRIALS, _AGAIN = 100, 4
-#: Costs beside that of a crossing, 1: of two branches at one level of a column, at neighbouring levels, and of climbing.
-_TOUCHING, _NEAR, _CLIMB = 0.3, 0.02, 0.02
+#: Costs beside that of a crossing, 1: of two branches at one level of a column, and at neighbouring levels or of climbing.
+_TOUCHING, _NEAR = 0.3, 0.02
 #: Rounds of straightening, and by how much each exceeds the way to a straight line.
 _STRAIGHTENED, _BEYOND_STRAIGHT = 80, 1.5
 #: The distance that branches and ends of branches keep above a column, relative to that of circles; less where many share the
-#: room. With half of it branches seem to touch ends of others; with twice as much they go far out of their way.
+#: room. They keep half of it from circles. With half of it branches seem to touch ends of others; with twice as much they go
+#: far out of their way.
 _APART = 0.13
-#: The distance that branches keep from circles above a column, relative to that of circles: a line does not lie on a circle.
-_CLEAR = 0.06
-#: Steps in kappa_n smaller than this are rounding errors of the splines, and columns closer than the second number are one.
-_STILL, _SAME = 1e-4, 1e-4
+#: Steps in kappa_n smaller than this are rounding errors of the splines, and columns that are closer are one.
+_SAME = 1e-4
 _OUTSIDE, _NOBODY = -1, np.zeros((0, 2))
 
 
@@ -114,7 +114,7 @@ def heights(curves, ends, window) -> list[np.ndarray]:
 def _turns(curve) -> np.ndarray:
     """Numbers of the points where a branch begins, turns and ends."""
     step = np.diff(curve)
-    moves = np.flatnonzero(np.abs(step) > _STILL)
+    moves = np.flatnonzero(np.abs(step) > _SAME)
     turns = moves[1:][np.sign(step[moves[1:]]) != np.sign(step[moves[:-1]])]
     return np.unique(np.concatenate([[0], turns, [len(curve) - 1]]))
 
@@ -150,7 +150,7 @@ def _levels(circles) -> np.ndarray:
     """All heights that a branch may have above a column; those of the circles are for ends of branches alone."""
     step = np.diff(circles).min(initial=2.0) / (_LEVELS + 1)
     between = [np.linspace(low, high, _LEVELS + 2)[1:-1] for low, high in zip(circles[:-1], circles[1:])]
-    beyond = step * np.arange(1, _BEYOND + 1)
+    beyond = step * np.arange(1, _LEVELS // 2 + 1)
     return np.sort(np.concatenate([circles, *between, circles[0] - beyond, circles[-1] + beyond]))
 
 
@@ -223,7 +223,7 @@ def _shortest(courses, mine: int, levels, circles) -> None:
     course = courses[mine]
     above, between = _others(courses, mine)
     spacing, last = np.diff(levels).min(), len(course.column) - 1
-    climb = _CLIMB * ((levels[:, None] - levels) / (levels[-1] - levels[0])) ** 2 * len(levels)
+    climb = _NEAR * ((levels[:, None] - levels) / (levels[-1] - levels[0])) ** 2 * len(levels)
     wrong = course.sense * (levels[None, :] - levels[:, None]) < 0
     cost, came = np.full(len(levels), np.inf), []
     cost[np.argmin(np.abs(levels - course.ends[0]))] = 0.0
@@ -280,7 +280,7 @@ def _straighten(courses, columns, circles) -> None:
                 column = course.column[t]
                 if column != _OUTSIDE:
                     goal = _straighter(course, t, columns, above[column], _APART * spacing, square)
-                    course.height[t] = above[column][own[t]] = _beside(goal, course.height[t], circles, _CLEAR * spacing)
+                    course.height[t] = above[column][own[t]] = _beside(goal, course.height[t], circles, _APART / 2 * spacing)
 
 
 def _straighter(course: Course, t: int, columns, beside, apart: float, square: float) -> float:

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contin.lowlevel import hermite
+from contin.lowlevel import hermite, levels
 
 #: A spline takes so many points; fewer are joined by straight lines.
 _FEWEST = 4
-#: Halvings of an interval in the search of a place: more would not change a double.
-_HALVINGS = 53
 
 
 def places(pieces: Sequence[dict], column: str, value: float, wanted: Sequence[str]) -> list[tuple[int, dict[str, float]]]:
@@ -46,7 +44,7 @@ def places(pieces: Sequence[dict], column: str, value: float, wanted: Sequence[s
     h, y0, y1 = np.diff(s)[inside, None], values[inside], values[inside + 1]
     cubic = (y0, h * left[inside], h * right[inside], y1)
     low, high = np.zeros(len(inside)), np.ones(len(inside))
-    for _ in range(_HALVINGS):
+    for _ in range(levels.MOST_HALVINGS):
         middle = (low + high) / 2
         before = (hermite(*cubic, middle[:, None])[:, 0] > value) == (y0[:, 0] > value)
         low, high = np.where(before, middle, low), np.where(before, high, middle)

@@ -29,7 +29,7 @@ MODES = ((1, 2), (1, 3), (1, 4), (3, 2), (3, 4), (5, 6))
 GAMMAS = (1.0, 10.0, 100.0)
 #: Where the curve of folds begins, and the other values of Gamma at which it is compared with the exact quadrature.
 CHECKED = (10.0, 100.0, 1000.0)
-WINDOW, _TOP = (-8.0, 14.0), 14.0
+WINDOW = (-8.0, 14.0)
 SCENE = (
     f"{{title: Fig. 12a at several widths, law: [ribbon, finite width], Gamma: [{', '.join(map(str, GAMMAS))}], nu: {NU}, "
     "m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], limits: {kappa_n: [-30, 40]}, stability: true, stride: 50}"
@@ -107,18 +107,20 @@ def _draw_curves(fold, birth, folder: Path) -> str:
     for m, n in MODES:
         colour, values = colour_of(n), np.array([threshold(m, n, Gamma) for Gamma in Gammas])
         axes.plot(Gammas, values, color=colour)
-        first = int(np.argmax(values < _TOP - 1))
+        first = int(np.argmax(values < WINDOW[1] - 1))
         axes.annotate(f"({m}, {n})", (Gammas[first], values[first]), (8, 5), textcoords="offset points", color=colour)
         for law, at, marker in ((FLAT_ROD, 0.05, "<"), (RIBBON, 1000, ">")):
             limit = thresholds(law, m, n, NU)[0]
-            if limit < _TOP:
+            if limit < WINDOW[1]:
                 axes.plot(at, limit, marker, color=colour, clip_on=False, ms=6)
     axes.plot(*_fine(fold).T, color="k", lw=2, label="fold of (1, 2)")
     axes.plot(*birth, "o", color="k", label=f"its birth, Γ = {birth[0]:.3f}")
     axes.plot([], [], color="0.4", label="threshold of (m, n)")
     axes.plot([], [], "<", color="0.4", label="flat rod")
     axes.plot([], [], ">", color="0.4", label="ribbon")
-    axes.set(xscale="log", xlim=(0.05, 1000), ylim=(-1, _TOP), xlabel=r"$\Gamma = w^2/(h L/2\pi)$", ylabel=r"$\kappa_n L/2\pi$")
+    axes.set(
+        xscale="log", xlim=(0.05, 1000), ylim=(-1, WINDOW[1]), xlabel=r"$\Gamma = w^2/(h L/2\pi)$", ylabel=r"$\kappa_n L/2\pi$"
+    )
     axes.legend(frameon=False, ncols=2, fontsize=9)
     axes.grid(alpha=0.2)
     return keep(figure, folder, "finite_width_curves")

@@ -18,7 +18,7 @@ from branches.run.progress import Progress
 from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, levels
 from ribbon_model.barriers import KICK_OPEN, SEGMENTS, Barrier, apart, at_rest, barriers, ways_down
 from ribbon_model.changed_ends import corrected
 from ribbon_model.descent import LONGEST, descend, past
@@ -30,12 +30,6 @@ if TYPE_CHECKING:
     from ribbon_model.open_segments import OpenChain
 
     Chain = OpenChain | NetworkChain
-
-#: Two states whose places differ by less than this are one: they were corrected from two sides, on two meshes. So are two
-#: values of a number, relative to 1 + its size, at which runs end.
-_SAME = 1e-6
-#: Energies of two strips of segments at rest that differ by less, relative to 1 + their size, are those of images.
-_EQUAL = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +102,7 @@ def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[
         if value is not None and name != here:
             continue
         x, at = branch.points[name][piece.rows], float(branch.points[name][row]) if value is None else value
-        gaps = np.where(np.abs(x - at) <= _SAME * (1 + abs(at)), 0.0, x - at)  # two ends that are located there may be there
+        gaps = np.where(np.abs(x - at) <= levels.APART * (1 + abs(at)), 0.0, x - at)  # two ends that are located there may be there
         for i in np.flatnonzero(gaps[:-1] * gaps[1:] <= 0):
             pair = piece.rows[i], piece.rows[i + 1]
             part = 0.0 if x[i] == x[i + 1] else float((at - x[i]) / (x[i + 1] - x[i]))
@@ -145,7 +139,7 @@ def _same(one: State, other: State) -> bool:
     t, problem = np.linspace(0, 1, 21), one.point.system.problem
     where = [at for at, name in enumerate(problem.state_names) if name.startswith(CENTRELINE)]
     places = [state.point.system.evaluate(state.point.x, t)[:, where] for state in (one, other)]
-    return bool(np.abs(places[0] - places[1]).max() < _SAME * one.stage.scene.longest)
+    return bool(np.abs(places[0] - places[1]).max() < levels.APART * one.stage.scene.longest)
 
 
 def _ways(states: Sequence[State]) -> dict[str, Barrier]:
@@ -173,7 +167,7 @@ def _name(end: Chain, stable: Sequence[State]) -> str | None:
     for name, rest in rests:
         if not apart(end, rest):
             return name
-    equal = (name for name, rest in rests if abs(end.energy - rest.energy) < _EQUAL * (1 + abs(rest.energy)))
+    equal = (name for name, rest in rests if abs(end.energy - rest.energy) < levels.APART * (1 + abs(rest.energy)))
     return next((f"an image of {name}" for name in equal), None)
 
 

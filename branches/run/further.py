@@ -11,13 +11,11 @@ from branches.run.barriers import State, chosen_rows, states_at
 from branches.run.progress import Progress
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, MeshControl, Search, Settings
-from contin.lowlevel import Searched, exact_text, further
+from contin.lowlevel import Searched, exact_text, further, levels
 
 #: Size of random perturbations: half waves and constants of about one in all states. Of the strip of open_clamped.yaml at 75 %,
 #: eight of them beside each state find eight further states, of size .3 one, of size 2 one.
 SIZES = (1.0,)
-#: Energies that differ by less, relative to 1 + their size, are one: the state is an image of a known one, in most cases.
-_EQUAL = 1e-7
 #: Further states at one place after which the search there ends: some strips have very many.
 MOST = 10
 
@@ -85,7 +83,7 @@ def report(branch: OpenBranch, draws: int, quiet: bool = True) -> list[str]:
 
 def _image(energy: float, known: list[float]) -> str:
     """Return words for a state with the energy of a known one."""
-    return " (that of a known state)" if any(abs(energy - one) <= _EQUAL * (1 + abs(one)) for one in known) else ""
+    return " (that of a known state)" if any(abs(energy - one) <= levels.APART * (1 + abs(one)) for one in known) else ""
 
 
 def _words(index: int) -> str:

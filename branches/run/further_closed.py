@@ -15,7 +15,7 @@ from branches.run.progress import Progress
 from branches.scene.closed import law_of
 from branches.store.read import read_branch
 from contin import Point
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, levels
 from ribbon_model.closed_search import further, waves
 from ribbon_model.solution import Solution
 
@@ -23,8 +23,6 @@ from ribbon_model.solution import Solution
 MOST = 10
 #: Draws beside each circle for each number that `--search` gives: one draw takes 0.02 s, a guess of an open strip 0.2 s.
 PER_DRAW = 4
-#: A smaller force is zero: on branches that leave a primary one it is of order one.
-_NO_FORCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class Found:
         """Return the state in one line."""
         force, count = float(np.linalg.norm(self.solution.force)), waves(self.solution)
         parts = f"{count} equal waves" if count > 1 else "no equal parts"
-        held = "no force" if force < _NO_FORCE else f"force {force:.6g}"
+        held = "no force" if force < levels.APART else f"force {force:.6g}"
         return f"energy {self.energy:.6g}, kappa* {self.kappa_star:.6g}, {held}, {parts}, index {self.index}"
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from branches.draw.notebook import MOST_ROWS
 from branches.graph.kinds import graph_kind
 from branches.graph.parts import add, counts
 from branches.graph.stored import DIAGRAM, new_graph, read_any, save
@@ -23,8 +24,6 @@ from branches.scene.sweep import Sweep
 from branches.store.files import ANOTHER_DIAGRAM, StoreError, another_scene, only_run, prepare, write_bytes
 from branches.store.read import read_branch
 
-#: Combinations without a branch that the summary names; the diagram names all. A sweep over nu has a thousand.
-_MOST_NAMED = 10
 #: Places in the order of branches are multiples of this, modulo 1 (the golden ratio): the branches so far are a fair sample.
 _SPREAD = (5**0.5 - 1) / 2
 
@@ -197,9 +196,9 @@ def _summary(sweep: Sweep, counts: tuple[str, str], failed: dict[str, str], left
     lines = [f"{counts[0]} in {seconds:.2f} s", f"  {counts[1]}"]
     if left_out:
         lines.append(f"  {left_out} duplicates (the same branches from their other ends) are merged")
-    lines += [f"  left out: {name}: {reason}" for name, reason in list(sweep.absent.items())[:_MOST_NAMED]]
-    if len(sweep.absent) > _MOST_NAMED:
-        lines.append(f"  left out: {len(sweep.absent) - _MOST_NAMED} more, which diagram.json names (absent)")
+    lines += [f"  left out: {name}: {reason}" for name, reason in list(sweep.absent.items())[:MOST_ROWS]]
+    if len(sweep.absent) > MOST_ROWS:
+        lines.append(f"  left out: {len(sweep.absent) - MOST_ROWS} more, which diagram.json names (absent)")
     lines += [f"  failed: {name}: {reason}" for name, reason in failed.items()]
     return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file per branch)"]
 

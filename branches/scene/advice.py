@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Callable, Iterator
 
 from contin import ContinError, Point, Reason, Settings
-from contin.lowlevel import Continuation, State, Stop, exact_text
+from contin.lowlevel import Continuation, State, Stop, exact_text, levels
 
 #: Points that a run must find with a changed field before that change is advised. With 1, changes were advised that help for
 #: one step only; with 100, a failed run takes as long again as a stage.
@@ -16,8 +16,6 @@ _POINTS = 10
 _SHORTER = 100.0
 #: The tolerance of the mesh is divided by this.
 _FINER = 100.0
-#: A point is at a limit if it is off by less than this, relative to the limits. Points at limits are located to 1e-12.
-_AT = 1e-8
 
 
 def no_state(run: Continuation, place: str) -> Stop:
@@ -81,6 +79,6 @@ def reached(stop: Stop, last: Point, run: Continuation, shown: Callable[[str, fl
         return stop
     for name, ends in run.settings.limits.items():
         end = min(ends, key=lambda end: abs(end - last[name]))
-        if abs(end - last[name]) <= _AT * (ends[1] - ends[0] + abs(end)):
+        if abs(end - last[name]) <= levels.LOCATED * (ends[1] - ends[0] + abs(end)):
             return dataclasses.replace(stop, message=f"reached {shown(name, end)}")
     return stop

@@ -18,8 +18,10 @@ from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text
+from contin.lowlevel import levels
 from ribbon_model import law_end
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
+from ribbon_model.law_end import NEARLY_ENDED
 from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.linear import covering, thresholds
 from ribbon_model.secondary import force, secondary_branch
@@ -27,20 +29,8 @@ from ribbon_model.seeds import half_loop_branch, primary_branch
 
 #: The first points of primary branches, by domain.
 _SEEDS = {CELL.name: primary_branch, HALF_LOOP.name: half_loop_branch}
-#: A smaller force counts as zero: on branches that leave a primary branch |R| is of order one.
-_NO_FORCE = 1e-7
 #: With less force than this, an extremum of kappa_n belongs to the pitchfork on the primary branch and is not a fold.
 _BESIDE = 1e-2
-#: Two points with the same kappa_n are equal if kappa* differs by less than this, relative to 1 + its size.
-_SAME_PLACE = 1e-6
-#: Largest distance of an end on a circle from the linear theory, over its error estimate. Other bifurcations of the circle are
-#: farther away.
-_ESTIMATES = 10
-#: The same, relative to 1 + the size of kappa_n, where that is larger: ends are known to 1e-11 and better.
-_SAME = 1e-7
-#: If the equations have no value a step further, a smaller margin of convexity means the end of the law: the response
-#: is found down to about 1e-2. With 0.5 another failure could be taken for the end of the law.
-_NEARLY_CONVEX = 0.1
 #: Words of the columns, and those of axes with the unit that a number is over. The same name may mean another thing in open
 #: strips: lengths are over L / 2 pi here, and the energy is a mean over the loop.
 _WORDS = {
@@ -116,7 +106,7 @@ class ClosedStage(Stage):
         if self.scene.origin is not None:
             if point.label == Label.FOLD and force(point) < _BESIDE:
                 return None
-            if point.name == START or not point.is_simple_branch_point or force(point) >= _NO_FORCE:
+            if point.name == START or not point.is_simple_branch_point or force(point) >= levels.APART:
                 return point
             run.stop = Stop(PRIMARY, "reached a primary branch, where R = 0")
             return dataclasses.replace(point, label=Label.END, name=PRIMARY)
@@ -152,7 +142,7 @@ class ClosedStage(Stage):
         value = state.system.parameter(state.x, "kappa_n")
         finite = np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step))))
         left = math.inf if margin is None or finite else margin(state.system, state.x)
-        if left > _NEARLY_CONVEX:
+        if left > NEARLY_ENDED:
             return no_state(run, f"kappa_n = {value:.6g}")
         return Stop(
             Reason.NO_CONVERGENCE,
@@ -217,7 +207,7 @@ def is_threshold(scene: ClosedScene, index: int, kappa_n: float, error: float) -
         known = thresholds(LAWS[scene.law], index, scene.n, scene.law_parameters)
     except (ValueError, ZeroDivisionError):
         return False
-    allowed = max(_SAME * (1 + abs(kappa_n)), 0.0 if math.isnan(error) else _ESTIMATES * error)
+    allowed = max(levels.APART * (1 + abs(kappa_n)), 0.0 if math.isnan(error) else levels.CERTAIN * error)
     return min(abs(value - kappa_n) for value in known) <= allowed
 
 
@@ -292,7 +282,7 @@ def _at_origin(scene: ClosedScene):
     primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
     system, x, tangent = seed(primary)
     for point in Continuation(system, x, settings_of(primary), tangent):
-        same = abs(point["kappa_star"] - origin.kappa_star) < _SAME_PLACE * (1 + abs(origin.kappa_star))
+        same = abs(point["kappa_star"] - origin.kappa_star) < levels.APART * (1 + abs(origin.kappa_star))
         if point.label == Label.USER_ZERO and same:
             return point
     raise ConfigError(

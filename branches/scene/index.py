@@ -9,6 +9,7 @@ from branches.scene.columns import Change
 from branches.scene.stage import Watch
 from contin import ConvergenceError, Event
 from contin.lowlevel import Label, correct
+from contin.lowlevel import levels
 from ribbon_model.law_end import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode
@@ -20,15 +21,10 @@ from ribbon_model.stability import Stability
 LABEL = "SB"
 #: The value of an index that could not be decided (on a bifurcation, an eigenvalue is zero).
 UNDECIDED = -1
-_ON_CIRCLE = 1e-6
 #: Near a primary branch, with less force than this, ...
 _LITTLE_FORCE = 0.5
-#: ... an eigenvalue below this may be one that vanishes there, and its sign has no meaning.
-_ZERO_BESIDE = 1e-8
 #: The class that keeps all symmetry. One of its eigenvalues passes zero at a fold, which the engine detects.
 _FULL = (0, "even")
-#: With a smaller margin of convexity the law ends, and there is no index.
-_CONVEX = 1e-6
 #: Number of points inside a step where the sign is evaluated: two secondary bifurcations in one step leave it unchanged.
 #: Pairs closer than a quarter of a step are missed.
 _LOOKS = 3
@@ -36,12 +32,10 @@ _LOOKS = 3
 #: nearer to zero. On the branches of configs/fig12.yaml those of 7 % of the steps do, those of all that pass zero by more than
 #: twice what they are. Ten times smaller, half of the steps are looked at.
 _MOVES = 0.25
-#: The computed value of the known zero, that of the shift of phase, is the error of the eigenvalues. If it is larger, the mesh
-#: of the state is too coarse for its index, and is halved at most so often. (Strips of finite width that are nearly
-#: folded need this: the zero was 1e-2, and an eigenvalue of 1e-3 changed its sign twice.)
-_RESOLVED, _HALVINGS = 1e-6, 4
-#: A point with a larger residual is not on the branch, and the shift of phase is not a zero there.
-_ON_BRANCH = 1e-7
+#: The computed value of the known zero, that of the shift of phase, is the error of the eigenvalues. Where it is not small, the
+#: mesh of the state is too coarse for its index, and is halved at most so often. (Strips of finite width that are nearly folded
+#: need this: the zero was 1e-2, and an eigenvalue of 1e-3 changed its sign twice.)
+_HALVINGS = 4
 #: Number of points whose stability is kept: all symmetry classes are evaluated at the same points of a step.
 _KEPT = 2 * _LOOKS + 4
 #: Distance from a bifurcation, along the branch, at which the index is computed, relative to 1 + |x|.
@@ -81,7 +75,7 @@ class SymmetryWatch(Watch):
     def _resolved(self, system, x, point) -> Stability:
         """Return the stability on the system's mesh, or on a finer one if the known zero of a point is not small."""
         result = self._evaluated(system, x)
-        if point is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
+        if point is None or result.residual <= levels.APART or np.abs(system.residual(x)).max() > levels.APART:
             return result
         tangent = point.tangent
         for _ in range(_HALVINGS):
@@ -93,7 +87,7 @@ class SymmetryWatch(Watch):
             except ConvergenceError:
                 break
             result = self._evaluated(system, x)
-            if result.residual <= _RESOLVED:
+            if result.residual <= levels.APART:
                 break
         return result
 
@@ -106,7 +100,7 @@ class SymmetryWatch(Watch):
         """Return the stability of a state; None where the energy is not convex and there is no index."""
         if self._margin is None:
             return self.at(system, x, point)
-        if not self._margin(system, x) > _CONVEX:
+        if not self._margin(system, x) > levels.APART:
             return None
         try:
             return self.at(system, x, point)
@@ -151,12 +145,12 @@ class SymmetryWatch(Watch):
             entry = result[name]
             values = entry.eigenvalues
             if not self._from_circle:
-                beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < _ZERO_BESIDE
+                beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < levels.DOUBLED
                 return np.nan if beside else float(np.prod(values))
             if (
-                name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE
+                name[0] == 0 and abs(trial["M2"]) < levels.APART
             ):  # zeros of rotations of a circle, in place of the phase of the branch
-                values = values[np.abs(values) > _ON_CIRCLE]
+                values = values[np.abs(values) > levels.APART]
             return float(np.prod(values))
 
         def may_pass(arc) -> bool:

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import Colour
+from contin.lowlevel import Colour, levels
 
-#: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
-#: known: its tolerance is this part of the size of a number.
-_NOTHING = 1e-12
 #: Colours of marks, all with black edges. Those of folds and bifurcations are of no wavenumber (`branches.draw.style`);
 #: yellow is Okabe & Ito's, too pale for lines.
 FOLD, END, USER, SECONDARY = Colour.YELLOW, Colour.BLACK, Colour.GREEN, "#BBBBBB"
@@ -112,4 +109,4 @@ def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
 
 def without_round_off(value: float, largest: float) -> float:
     """Return a value of a stage, 0 where it is round-off; ``largest`` is the largest one of the stage."""
-    return 0.0 if abs(value) <= _NOTHING * abs(largest) else value
+    return 0.0 if abs(value) <= levels.CORRECTED * abs(largest) else value

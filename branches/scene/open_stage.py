@@ -18,16 +18,12 @@ from branches.scene.open_strip import OpenScene, StagedScene
 from branches.scene.stage import Stage, Watch
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, point_of
+from contin.lowlevel import levels
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
 from ribbon_model.loads import STROKE
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
-#: A stage may start outside its limits by this part of them: it may start where another one has stopped. Points at limits are
-#: located to 1e-12; ten times larger, starts that are outside by that are taken for starts at the limit.
-_SLACK = 1e-9
-#: A state keeps a symmetry that moves it by less than this.
-_KEEPS = 1e-6
 #: Words of the columns, and those of axes. Lengths are over that of the strip, unless the scene has dimensions.
 _WORDS = {
     "distance": ("place of the last end along the tangent of the first one", "distance of the ends"),
@@ -82,7 +78,7 @@ class SymmetriesWatch(Watch):
     def change(self, point: Point) -> Change:
         before, after = point.index_change or (None, None)
         states = point.system.states(point.x)[:, : point.system.problem.dimension]
-        kept = [name for name, image in self._symmetries.items() if np.abs(image(None, states) - states).max() < _KEEPS]
+        kept = [name for name, image in self._symmetries.items() if np.abs(image(None, states) - states).max() < levels.APART]
         broken = ", ".join(name for name in point.breaks if name in kept)
         return Change(-1 if before is None else before, -1 if after is None else after, point.nullity, broken)
 
@@ -164,7 +160,7 @@ class OpenStage(Stage):
         ends = run.settings.limits[self.follow]
         to = self.stage.to / self.scene.factor(self.follow)
         other = max(ends, key=lambda end: abs(end - to))
-        if abs(last[self.follow] - other) > _SLACK * (ends[1] - ends[0]):
+        if abs(last[self.follow] - other) > levels.LOCATED * (ends[1] - ends[0]):
             return []
         there, here = (self._shown(self.follow, value) for value in (to, other))
         return [f"stage {self.number}: {there} was not reached: the strip came back, to {here}"]
@@ -208,7 +204,7 @@ class OpenStage(Stage):
             ) from error
         start = point_of(run.state.system, run.state.x)
         for name, (low, high) in run.settings.limits.items():
-            slack = _SLACK * max(abs(low), abs(high), high - low)
+            slack = levels.LOCATED * max(abs(low), abs(high), high - low)
             if not low - slack <= start[name] <= high + slack:
                 here, *ends = (f"{self.scene.factor(name) * value:.10g}" for value in (start[name], low, high))
                 words, unit = " to ".join(ends), f" {self.scene.unit(name)}".rstrip()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from branches.draw.notebook import MOST_ROWS
 from branches.draw.strip import OBLIQUE, View
 from branches.draw.style import smooth
 from branches.scene.columns import Columns
@@ -25,9 +26,6 @@ if TYPE_CHECKING:  # the mechanics of a kind of strip are imported with its stag
     from branches.scene.stage import Stage
     from contin.lowlevel import Collocation
     from ribbon_model.shape import Shape
-
-#: So many labelled points are shown at a prompt, a line each: a screen has 24 lines.
-_SHOWN = 20
 
 
 @dataclass(frozen=True)
@@ -81,10 +79,10 @@ class StoredBranch(ABC):
 
     def __repr__(self) -> str:
         lines = [f"{type(self).__name__}({self.about}: {len(self.points)} points, {self.status}; {self.stop or 'not ended'})"]
-        for row, event in enumerate(self.events[:_SHOWN]):
+        for row, event in enumerate(self.events[:MOST_ROWS]):
             label, name = event["label"].decode(), event["name"].decode()
             lines.append(f"  point {event['point']:5d}  {label}  {self.place(row)}{f': {name}' if name else ''}")
-        more = len(self.events) - _SHOWN
+        more = len(self.events) - MOST_ROWS
         return "\n".join([*lines, *([f"  ... {more} more in events"] if more > 0 else [])])
 
     # --- the scene ------------------------------------------------------------------------------------------------------

@@ -12,16 +12,13 @@ from branches.draw.shapes import flat_across
 from branches.draw.strip import View
 from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure
 from branches.store.open_branch import OpenBranch
+from contin.lowlevel import levels
 from ribbon_model.ends import CLAMPED, HINGED, unit
 from ribbon_model.members import HINGE, RIGID, START, Joint, JointEnd
 from ribbon_model.network import Network
 
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
 _VIEW = View(-70.0, 20.0)
-#: Two tangents whose product differs from 1 by less are one direction: a strip that goes on there has no corner.
-_STRAIGHT = 1e-9
-#: A dead force below this part of the largest one is not drawn: forces are found to 1e-12 and better.
-_NOTHING = 1e-9
 
 
 class NetworkBranch(OpenBranch):
@@ -42,7 +39,7 @@ class NetworkBranch(OpenBranch):
     def force(self, number: str) -> np.ndarray:
         """Return a dead force at all points, 0 where it is round-off of the largest one in the file."""
         values = self.points[number]
-        return np.where(np.abs(values) > _NOTHING * self._largest, values, 0.0)
+        return np.where(np.abs(values) > levels.LOCATED * self._largest, values, 0.0)
 
     @functools.cached_property
     def _largest(self) -> float:
@@ -114,4 +111,4 @@ def _goes_on(network: Network, joint: Joint) -> bool:
     if any(each.angle != 0 or any(each.arm) for each in joint.members):
         return False
     one, other = (network.drawn_axes(each)[2] * (1 if each.end == START else -1) for each in joint.members)
-    return len({network.members[each.member].section for each in joint.members}) == 1 and -one @ other > 1 - _STRAIGHT
+    return len({network.members[each.member].section for each in joint.members}) == 1 and -one @ other > 1 - levels.LOCATED

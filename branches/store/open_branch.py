@@ -15,15 +15,13 @@ from branches.draw.structure import parts_of
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
-from contin.lowlevel import PALETTE, Collocation
+from contin.lowlevel import PALETTE, Collocation, levels
 from ribbon_model.changed_ends import fitted
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.shape import Shape, interpolated, shape_of
 
-#: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
-_SAME = 1e-6
 #: Width of drawn strips of unknown dimensions, over the length of the longest.
 _WIDTH = 0.06
 
@@ -169,7 +167,7 @@ class OpenBranch(StoredBranch):
             energy, value = self.points["potential"], float(event[name])
             for piece in pieces:
                 state = self._below(piece, row, name, value) if piece.stable else None
-                if state is not None and energy[row] - state["potential"] > _SAME * (1 + abs(energy[row])):
+                if state is not None and energy[row] - state["potential"] > levels.APART * (1 + abs(energy[row])):
                     found.append(Snap(row, name, value, state, float(energy[row] - state["potential"])))
         best: dict[int, Snap] = {}
         for snap in found:
@@ -202,6 +200,6 @@ class OpenBranch(StoredBranch):
             return False
         for other in strip.parameters:
             a, b = (float(self.points[other][row]) for row in (first, second))
-            if other != name and abs(a - b) > _SAME * (1 + abs(a)):
+            if other != name and abs(a - b) > levels.APART * (1 + abs(a)):
                 return False
         return True

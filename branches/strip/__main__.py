@@ -15,11 +15,10 @@ from pathlib import Path
 from branches.scene.units import STRIP_UNITS
 from branches.store.command import Parser, Quantity, complain, survive_any_encoding, write_output
 from branches.store.files import StoreError, check_picture
+from branches.strip.states import MOST_COVERINGS
 from ribbon_model.strip import Strip
 
 _HELP = {"": "Poisson's ratio", "Pa": "Pa, or with a unit as in 210GPa", "m": "m, or with a unit as in 5mm"}
-#: Most turns of a loop that --want and --chart take.
-_MOST_TURNS = 15
 
 
 def parser() -> Parser:
@@ -64,8 +63,8 @@ def _check(asked: dict) -> None:
         if asked[name] is not None and not 0 < asked[name] < math.inf:
             raise ValueError(f"{name}: {asked[name]:g} must be positive and finite")
     turns = asked["turns"]
-    if turns is not None and not (turns % 2 and 1 <= turns <= _MOST_TURNS):
-        raise ValueError(f"turns: {turns} must be odd, from 1 to {_MOST_TURNS}: a loop cannot be folded into others")
+    if turns is not None and not (turns % 2 and 1 <= turns <= MOST_COVERINGS):
+        raise ValueError(f"turns: {turns} must be odd, from 1 to {MOST_COVERINGS}: a loop cannot be folded into others")
     if turns is not None and asked["want"] is None and asked["chart"] is None:
         raise ValueError("turns: it belongs to want or chart, and neither is given")
     if asked["chart"] is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from branches.run.progress import Progress
 from contin import Settings, trace
 from contin.lowlevel import Label, point_of
+from contin.lowlevel import levels
 from ribbon_model import law_end, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
@@ -23,13 +24,9 @@ from ribbon_model.solution import Solution
 from ribbon_model.strip import Strip
 
 #: Covering indices considered: odd ones, as a loop can be folded into these; up to the second beyond the natural curvature.
-_COVERINGS, _MOST_COVERINGS = 7, 15
+_COVERINGS, MOST_COVERINGS = 7, 15
 #: Branches are followed to this distance from the natural curvature, over 2 pi/L.
 _REACH = 40.0
-#: States whose energies and conjugate curvatures differ by less are the same.
-_SAME = 1e-8
-#: The same for energies of saddles reached by two methods, each on a mesh of its own.
-_SAME_SADDLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,7 @@ class State:
 
 def coverings(strip: Strip) -> range:
     """Return the covering indices of the circles that are considered."""
-    return range(1, max(_COVERINGS, min(_MOST_COVERINGS, 2 * int(strip.kappa_n / 2) + 5)) + 1, 2)
+    return range(1, max(_COVERINGS, min(MOST_COVERINGS, 2 * int(strip.kappa_n / 2) + 5)) + 1, 2)
 
 
 def circles(strip: Strip) -> list[State]:
@@ -107,7 +104,9 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
                 found, lost = [], [*lost, (m, n)]
             for point, equilibrium in found:
                 place = point["energy"], point["kappa_star"]
-                if not any(n == other and np.allclose(place, there, rtol=_SAME, atol=_SAME) for other, there in seen):
+                if not any(
+                    n == other and np.allclose(place, there, rtol=levels.APART, atol=levels.APART) for other, there in seen
+                ):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
             progress.part_done()
@@ -178,7 +177,7 @@ def by_hand(strip: Strip, states: Sequence[State], ways: Mapping[str, Barrier], 
             progress.part(ring.name)
             path = folding(FINITE_WIDTH, ring.m, strip.kappa_n, strip.parameters)
             end = math.nan if path is None else _energy(strip, path.energies[-1])
-            if path is not None and abs(end - energies[ways[ring.name].saddle]) < _SAME_SADDLE * strip.energy_unit:
+            if path is not None and abs(end - energies[ways[ring.name].saddle]) < levels.APART * strip.energy_unit:
                 found[ring.name] = path
             progress.part_done()
     return found
