@@ -73,11 +73,10 @@ def _values(strip: OpenStrip, before: Mapping[str, float], last: np.ndarray) -> 
 
 def held_angles(end: End, q, known: Sequence[float] | None) -> tuple[float, ...]:
     """Return turn, bend and swing that an end with a quaternion has: the known ones where they hold it so, or next to them."""
-    if (
-        known is not None
-        and max(map(abs, ends.rotation_conditions(end)(q, ends.prescribed(*known))), default=0.0) < levels.LOCATED
-    ):
-        return tuple(known)
+    if known is not None:
+        missed = ends.rotation_conditions(end)(q, ends.prescribed(*known))
+        if max(map(abs, missed), default=0.0) < levels.LOCATED:
+            return tuple(known)
     return angles_near(q, known or (0.0, 0.0, 0.0))
 
 

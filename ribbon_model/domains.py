@@ -133,9 +133,8 @@ class Cell(Domain):
         axis = p["sense"] * np.array([p["M1"], p["M2"], 0.0])
         axis /= np.linalg.norm(axis)
         angle, centre = 4 * p["turn"], np.zeros(3)
-        if (
-            abs(math.sin(angle / 2)) > levels.LOCATED
-        ):  # where the two-fold axis (through x along d2) meets the plane of the mirror
+        if abs(math.sin(angle / 2)) > levels.LOCATED:
+            # where the two-fold axis (through x along d2) meets the plane of the mirror
             d2, x, normal = part.directors[-1, 1], part.centreline[-1], part.directors[0, 2]
             centre = x - d2 * (x @ normal) / (d2 @ normal)
         return self.unfold(part).repeated(self.wavenumber(p), axis, centre, angle)

@@ -104,9 +104,8 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
                 found, lost = [], [*lost, (m, n)]
             for point, equilibrium in found:
                 place = point["energy"], point["kappa_star"]
-                if not any(
-                    n == other and np.allclose(place, there, rtol=levels.APART, atol=levels.APART) for other, there in seen
-                ):
+                near = {"rtol": levels.APART, "atol": levels.APART}
+                if not any(n == other and np.allclose(place, there, **near) for other, there in seen):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
             progress.part_done()
