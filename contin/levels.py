@@ -35,6 +35,13 @@ DOUBLED = 1e-7
 #: to 1e-9, and by 4e-7 where a multiplier 1 is double. It is also the distance beside a point at which signs are looked at. At
 #: 1e-5, folds at pitchforks would be missed, as references are too old.
 APART = 1e-6
+#: Distance beside a point, along a tangent or as a part of a step, at which signs are looked at where tangents at the point are
+#: blurred: located points are known to 1e-9 to 1e-6. Ten times larger, another special point could lie between.
+BESIDE = 1e-4
+#: What is known from an interpolation, a scan or differences, and what Newton's method begins from: three digits. So well the
+#: cubic knows the place of a fold (2e-4 of a step); directions, multipliers that are double at a fold and orbits that have come
+#: back are alike up to this.
+ROUGH = 1e-3
 #: A number this many times its estimated error is not zero. An error that three random roundings estimate is ten times too
 #: small by chance once in 5,000 times. Ten times larger, branches of length 1e-10 would not end, and errors of 1e-10 would pass
 #: where Newton's method leaves 1e-12.

@@ -24,8 +24,6 @@ from ribbon_model.segments import Chain, Strip, discretized
 KICK_OPEN = 2 * math.pi * KICK
 #: Times that a strip which rests in a saddle is kicked out of it.
 _KICKS = 5
-#: Root mean square difference of the strains, relative to that of one, of two states of an open strip at rest.
-_APART = 1e-3
 #: Relative difference of the energies of a state at rest and of the continuous state cut into segments, which are not quite at
 #: rest.
 _CUT = 1e-4
@@ -103,7 +101,7 @@ def at_rest(strip: Segmented, kick: float, longest: float = LONGEST) -> Segmente
 def apart(first: Chain, last: Chain) -> bool:
     """Return whether two open strips at rest, on the same segments, are two states."""
     size = float(np.sqrt(np.mean(first.strains**2)))
-    return float(np.sqrt(np.mean((first.strains - last.strains) ** 2))) > _APART * (1 + size)
+    return float(np.sqrt(np.mean((first.strains - last.strains) ** 2))) > levels.ROUGH * (1 + size)
 
 
 def covering_index(strip: Strip) -> int | None:

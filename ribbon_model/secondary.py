@@ -15,14 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contin.lowlevel import locate_branch_point
+from contin.lowlevel import levels, locate_branch_point
 from ribbon_model.domains import Domain
 
 if TYPE_CHECKING:  # what a caller has it from
     from ribbon_model.solution import Solution
-
-#: Largest distance of the bifurcation on the half loop from the start of its search, relative to 1 + |kappa_n|.
-_NEAR = 1e-4
 
 
 def force(point) -> float:
@@ -49,7 +46,7 @@ def secondary_branch(solution: Solution, domain: Domain):
     system, x = solution.on(domain).discretized()
     found = locate_branch_point(system, x)
     at, kappa_n = system.parameter_index("kappa_n"), solution.parameters["kappa_n"]
-    near = abs(found.x[at] - kappa_n) < _NEAR * (1 + abs(kappa_n))
+    near = abs(found.x[at] - kappa_n) < levels.ROUGH * (1 + abs(kappa_n))
     if not (near and found.tangents):
         raise ValueError(f"nothing leaves the half loop with the {domain.reversal} at kappa_n = {kappa_n:.6g}")
     forces = [system.parameter_index(name) for name in system.free if name.startswith("R")]

@@ -6,15 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contin.lowlevel import Collocation, locate_branch_point
+from contin.lowlevel import Collocation, levels, locate_branch_point
 from ribbon_model.domains import CELL, HALF_LOOP
 from ribbon_model.law import Law, TwoBendings
 from ribbon_model.linear import circle, thresholds
 from ribbon_model.older import takes_parameters
-
-#: Difference of bendings, relative to that of the circle, up to which they are those of one minimum: it is 1e-9 at most there,
-#: where U is nearly not convex. Two minima differ by more than a tenth.
-_SAME_BENDING = 1e-3
 
 
 @takes_parameters
@@ -83,7 +79,7 @@ def _start(law: Law, m: int, n: int, parameters: float | Mapping[str, float], ro
     kappa_n = thresholds(law, m, n, parameters)[root]
     moment: float = circle(law, m, kappa_n, parameters)["M1"]
     bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(parameters).values())[0][0, 0]
-    if not abs(bending - m) < _SAME_BENDING * m:
+    if not abs(bending - m) < levels.ROUGH * m:
         raise TwoBendings(
             f"m = {m}, n = {n}: the strain energy of the circle where the branch begins, at kappa_n = {kappa_n:.6g}, has two "
             f"minima, and the law {law.name!r} takes the other one; it holds for smaller n"

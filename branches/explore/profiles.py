@@ -15,7 +15,7 @@ from contin.lowlevel import Label, StoredColumns, read_columns
 #: The column of the size of the states, their root mean square over the nodes.
 NORM = "norm"
 #: Nodes of a profile, at most. Twice as many make pages twice as large; a quarter of them shows corners at steep layers.
-_MOST_NODES = 161
+MOST_NODES = 161
 #: Kinds of labelled points, as the page knows them.
 KINDS = {Label.FOLD: "fold", Label.BRANCH_POINT: "secondary", Label.HOPF: "hopf", Label.USER_ZERO: "user"}
 
@@ -68,7 +68,7 @@ def _read(path: Path) -> StoredColumns:
 
 def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
     kept = [*axes, *(name for name in ("arclength", "index") if name in stored.columns and name not in axes)]
-    count = min(max(len(times) for times, _ in stored.profiles), _MOST_NODES)
+    count = min(max(len(times) for times, _ in stored.profiles), MOST_NODES)
     values = np.array([_sampled(times, states, count) for times, states in stored.profiles])
     return {
         "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop,

@@ -10,14 +10,15 @@ import numpy as np
 
 from branches.draw.strip import steady
 from branches.explore.packing import column, compressed
+from branches.explore.profiles import MOST_NODES
 from branches.store.branch import StoredBranch
 from contin import ConvergenceError
 from ribbon_model.descent import METRICS, SEGMENTS, Descent, Rest, let_go, past
 from ribbon_model.segments import discretized
 from ribbon_model.shape import Shape, quaternions
 
-#: Strips on the way that the page holds, and their stations. With half as many the film of the longest way (1, 2) stutters.
-_FRAMES, _STATIONS = 40, 193
+#: Strips on the way that the page holds. With half as many the film of the longest way (1, 2) stutters.
+_FRAMES = 40
 
 
 def way_down(branch: StoredBranch, event: np.void) -> dict | None:
@@ -49,7 +50,7 @@ def _end(rest: Rest) -> dict:
 def _film(descent: Descent) -> dict:
     """Return columns and shapes of strips at equal distances along the way, each turned so that it moves least."""
     strips = list(dict.fromkeys(descent.frames(_FRAMES)))
-    shapes = steady({number: strip.shape(_STATIONS).placed(2 * math.pi) for number, strip in enumerate(strips)})
+    shapes = steady({number: strip.shape(MOST_NODES).placed(2 * math.pi) for number, strip in enumerate(strips)})
     values = states_of(shapes.values())
     columns = {"arclength": np.arange(len(strips)), "kappa_n": descent.end.kappa_n, "energy": [one.energy for one in strips]}
     packed = {name: column(np.broadcast_to(numbers, len(strips)).astype(float)) for name, numbers in columns.items()}

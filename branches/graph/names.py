@@ -12,9 +12,8 @@ _STYLE = {
 }  # fmt: skip
 #: Colour of the thin line from a name to its line.
 _LEADER = "#777777"
-#: Distance of points along a line, in pixels, less than twice the room: thin lines do not slip between them.
-_STEP = 2.0
-#: Room that a name keeps around itself, in pixels, and the distance, in sizes of the name, beyond which more is no better.
+#: Room that a name keeps around itself, in pixels, and distance of points along a line; and the distance, in sizes of the name,
+#: beyond which more is no better.
 _ROOM, _FAR = 1.5, 2.5
 #: Points of a line at which a thin line may end; the distance to other lines there, in pixels, if it has to cross others.
 _ENDS, _ALONE = 60, 4.0
@@ -86,7 +85,7 @@ def _beside(line, there, half, frame, alone=0.0):
     ends = line[_distances(line, there, np.full(2, alone or _ROOM)) >= 1]
     if not len(ends):
         return None
-    corners = [np.arange(low + size, high - size, 2 * _STEP) for low, high, size in zip(*frame, half)]
+    corners = [np.arange(low + size, high - size, 2 * _ROOM) for low, high, size in zip(*frame, half)]
     places = np.stack(np.meshgrid(*corners), axis=-1).reshape(-1, 2)
     places = places[_distances(places, np.concatenate([there, line]), half) >= 1]
     others, ends = KDTree(there), ends[:: max(1, len(ends) // _ENDS)]
@@ -110,11 +109,11 @@ def _resampled(axes, x, y) -> np.ndarray:
     """Pixels at equal distances along a line, or that of a mark."""
     pixels = axes.transData.transform(np.column_stack(np.atleast_1d(x, y)))
     way = np.append(0, np.cumsum(np.hypot(*np.diff(pixels, axis=0).T)))
-    at = np.arange(0, way[-1] + _STEP, _STEP)
+    at = np.arange(0, way[-1] + _ROOM, _ROOM)
     return np.column_stack([np.interp(at, way, column) for column in pixels.T])
 
 
 def _grid(box) -> np.ndarray:
     """Pixels over a box."""
-    x, y = (np.linspace(low, high, max(2, int((high - low) / _STEP))) for low, high in box.get_points().T)
+    x, y = (np.linspace(low, high, max(2, int((high - low) / _ROOM))) for low, high in box.get_points().T)
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

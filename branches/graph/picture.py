@@ -13,6 +13,7 @@ from branches.graph.closed import families, pieces, secondaries
 from branches.graph.names import name_lines
 from branches.scene.closed import and_nu
 from branches.scene.labels import END, MARKS
+from contin.lowlevel import levels
 
 STABLE, UNSTABLE = "#000000", "#8a8a8a"
 #: The part of kappa_n that pictures of the diagram show at most, and the margin around special points, relative to their range.
@@ -31,8 +32,6 @@ _INSETS, _NUMBERS, _SEARCH = ((0.5, 0.21), (0.36, 0.16), (0.3, 0.12)), (0.07, 0.
 _NO_WAVE = "#000000"
 #: Largest step in kappa_n of what is drawn, far less than the diagrams' 22; and into how many parts a step is cut at most.
 _STEP, _MOST_PARTS = 0.05, 200
-#: Marks closer than this to a branch, in (kappa_n, kappa*), are on it: branches are drawn by splines through their points.
-_SAME_PLACE = 1e-3
 #: Widths of branches in a diagram, by whether they are stable; None: not known.
 _WIDTHS = {True: 3.4, False: 1.4, None: 1.4}
 #: Places of a circle at which kappa* is computed; it is no straight line if the law is not linear.
@@ -295,7 +294,7 @@ def _height_at(mark: Mark, placed) -> float | None:
     """The height of a mark on one of the lines that have theirs; that of a mark that no line has is kappa*, or free."""
     for line, height in placed:
         number = line.place(mark)
-        if np.hypot(line.kappa_n[number] - mark.kappa_n, line.kappa_star[number] - mark.kappa_star) < _SAME_PLACE:
+        if np.hypot(line.kappa_n[number] - mark.kappa_n, line.kappa_star[number] - mark.kappa_star) < levels.ROUGH:
             return float(height[number])
     return None if mark.kind == "leaves" else mark.kappa_star
 

@@ -12,10 +12,8 @@ from contin.lowlevel import Continuation, State, Stop, exact_text, levels
 #: Points that a run must find with a changed field before that change is advised. With 1, changes were advised that help for
 #: one step only; with 100, a failed run takes as long again as a stage.
 _POINTS = 10
-#: The smallest step is divided by this, then by its square.
+#: The smallest step is divided by this, then by its square; the tolerance of the mesh is divided by it once.
 _SHORTER = 100.0
-#: The tolerance of the mesh is divided by this.
-_FINER = 100.0
 
 
 def no_state(run: Continuation, place: str) -> Stop:
@@ -54,7 +52,7 @@ def _changes(run: Continuation) -> Iterator[tuple[str, State, Settings]]:
     previous = None if state.previous_tangent is None else carry(state.previous_tangent)
     finer = dataclasses.replace(state, system=system, x=carry(state.x), tangent=carry(state.tangent), previous_tangent=previous)
     if system.intervals <= settings.mesh.max_intervals and settings.mesh.every:
-        mesh = dataclasses.replace(settings.mesh, tolerance=settings.mesh.tolerance / _FINER)
+        mesh = dataclasses.replace(settings.mesh, tolerance=settings.mesh.tolerance / _SHORTER)
         yield f"mesh.tolerance: {mesh.tolerance:g}", finer, dataclasses.replace(settings, mesh=mesh)
     mesh = dataclasses.replace(settings.mesh, every=0)
     fixed = f"mesh.intervals: {system.intervals} and mesh.adapt_every: 0"

@@ -38,8 +38,6 @@ _MOVES = 0.25
 _HALVINGS = 4
 #: Number of points whose stability is kept: all symmetry classes are evaluated at the same points of a step.
 _KEPT = 2 * _LOOKS + 4
-#: Distance from a bifurcation, along the branch, at which the index is computed, relative to 1 + |x|.
-_BESIDE = 1e-3
 
 
 class SymmetryWatch(Watch):
@@ -124,7 +122,7 @@ class SymmetryWatch(Watch):
     def _beside(self, point, side: int) -> int:
         """Return the index at a small distance along the branch."""
         tangent = point.tangent / np.linalg.norm(point.tangent)
-        distance = side * _BESIDE * (1 + np.linalg.norm(point.x))
+        distance = side * levels.BESIDE * (1 + np.linalg.norm(point.x))
         try:
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
         except ConvergenceError:  # for example at a bifurcation that was not located

@@ -37,7 +37,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
-from contin.levels import DEPENDENT
+from contin.levels import DEPENDENT, ROUGH
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -94,11 +94,11 @@ class SecondVariation:
         if not symmetries:
             return ()
         mesh = self._parts[0].profile.mesh
-        t = np.linspace(mesh[0], mesh[-1], _PLACES)
+        t = np.linspace(mesh[0], mesh[-1])
         modes = self.modes(count, t)
         return tuple(
             name for name, image in symmetries.items()
-            if any(np.abs(np.asarray(image(t, mode)) - mode).max() > _KEEPS for mode in modes)
+            if any(np.abs(np.asarray(image(t, mode)) - mode).max() > ROUGH for mode in modes)
         )  # fmt: skip
 
 
@@ -196,12 +196,6 @@ def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
     if sizes.size and not sizes.min() > DEPENDENT * sizes.max():
         return Undetermined.MODE
     return ""
-
-
-#: A mode keeps a symmetry that maps it to itself up to this part of its size, and breaks one that does not.
-_KEEPS = 1e-4
-#: Places at which a mode and its image are compared.
-_PLACES = 101
 
 
 class _Pieces(NamedTuple):

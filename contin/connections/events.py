@@ -35,13 +35,11 @@ from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
-from contin.levels import CORRECTED, DOUBLED, LOCATED
+from contin.levels import CORRECTED, DOUBLED, LOCATED, ROUGH
 from contin.linalg.orientation import oriented
 
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
-#: An eigenvalue whose real part is below this part of the largest one lies on the axis; a double zero is known to 1e-5.
-_ON_AXIS = 1e-3
 #: The labels of the test functions whose points `named` calls otherwise.
 _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 
@@ -153,7 +151,7 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
         return None
     if _system(point.trial).problem.saddle_node:
         values = _system(point.trial).saddle(point.trial.x).values
-        critical = np.count_nonzero(np.abs(values.real) < _ON_AXIS * np.abs(values).max())
+        critical = np.count_nonzero(np.abs(values.real) < ROUGH * np.abs(values).max())
         has_pair = point.label == Label.BOGDANOV_TAKENS and critical > 2
         return (Label.ZERO_HOPF, "zero-Hopf: the saddle-node has a pair, too") if has_pair else None
     kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]

@@ -16,7 +16,7 @@ from contin.core.step import LONGER, aims, corrected, judged, predict
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError
-from contin.levels import MOST_STEPS
+from contin.levels import BESIDE, MOST_STEPS
 from contin.names import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -31,9 +31,9 @@ _STEPS = 10
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
-#: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
-#: on such a way: for a smooth function, it is about as large as the way.
-_CORNER, _JUMP = 1e-4, 0.1
+#: Part that the bend of a corner has of the usual change of the residual on a way along the tangent: for a smooth function, it
+#: is about as large as the way.
+_JUMP = 0.1
 #: On a tenth of the way the bend of a corner is a tenth, more than this part, and that of a smooth curve a hundredth, however
 #: small its radius.
 _LIKE = 0.05
@@ -68,8 +68,8 @@ def no_convergence(state: State, settings: Settings, error: ConvergenceError) ->
 
 def _meets_corner(state: State) -> bool:
     """Return whether the residual bends within a short way along the tangent as only a corner does."""
-    bend, usual = _bend(state, _CORNER)
-    return bool(bend > _JUMP * usual and _bend(state, _CORNER / 10)[0] > _LIKE * bend)
+    bend, usual = _bend(state, BESIDE)
+    return bool(bend > _JUMP * usual and _bend(state, BESIDE / 10)[0] > _LIKE * bend)
 
 
 def _bend(state: State, length: float) -> tuple[float, float]:

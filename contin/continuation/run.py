@@ -39,11 +39,9 @@ from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.extrema import extremum
 from contin.events.inspection import Start
 from contin.events.usual import fold, limits, user_zeros, within_limits
+from contin.levels import ROUGH
 from contin.names import exact_text
 from contin.results.point import Point
-
-#: A step is cut down to this fraction of itself to take several branch points one by one.
-_FINEST = 1e-3
 
 
 class Continuation:
@@ -271,7 +269,7 @@ class Continuation:
         settings, (step, _, made), self._handed = self.settings, self._handed or (0.0, None, None), None
         if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
             step, made = up_to_limits(state, settings.limits, settings.min_step), None
-        finest = max(settings.min_step, _FINEST * step)
+        finest = max(settings.min_step, ROUGH * step)
         while True:
             try:
                 arc, judgement = self._meshes.good_step(self, step, made)

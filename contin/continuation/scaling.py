@@ -36,15 +36,13 @@ from contin.core.settings import Settings
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
 from contin.events.significance import on_finer_mesh
-from contin.levels import APART, CORRECTED, DOUBLED
+from contin.levels import APART, CORRECTED, DOUBLED, ROUGH
+from contin.linalg.layout import MANY
 from contin.problems.statement import declared
 
 #: Iterations of the power method, and largest Krylov space that parts close eigenvalues. Sizes are powers of two: the distance
 #: to the nearest singular point needs no digits. Ten times more separate eigenvalues that differ by a tenth.
 _ITERATIONS = 12
-#: The iterations end earlier where their numbers change by less than this part. Without it, sizes of the benchmarks' half loop
-#: take a third longer; with ten times more or less they take the same, and the tests find the same.
-_SETTLED = 1e-3
 #: Fewest numbers that are compared.
 _FEWEST = 4
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
@@ -57,8 +55,6 @@ _FAR = 9e-4
 #: found. Of single numbers two that are nothing but round-off agree to a
 #: thirtieth in one case of fifty: under one of OpenBLAS's kernels an arch had a multiplier of size 1e-16, and did not move.
 _CLEAR = 1e4
-#: Largest number of states that are looked at one by one: more would take longer than the run.
-_MOST = 200
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
 _HIGHEST = 5
 
@@ -242,7 +238,7 @@ class _FirstPoint:
     def _alone(self, which: Pattern) -> Array:
         """Return how far states can change by themselves before F_x is singular; infinity where that never happens."""
         found = np.full(which.size, np.inf)
-        for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
+        for number in np.flatnonzero(which) if np.count_nonzero(which) <= MANY else ():
             alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
             mode = self._nearest(alone, np.ones_like(which))
             found[number] = np.inf if mode is None else mode.distance
@@ -425,7 +421,7 @@ def _has_settled(numbers: Sequence[float]) -> bool:
     if len(numbers) < _FEWEST:
         return False
     one, other = numbers[-1] * numbers[-2], numbers[-3] * numbers[-4]
-    return abs(one - other) < _SETTLED * one
+    return abs(one - other) < ROUGH * one
 
 
 def _reach(terms: Sequence[Array]) -> float:

@@ -32,7 +32,7 @@ from contin.collocation.one_call import (
 from contin.collocation.workspace import Workspace
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError
-from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES
+from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.condensation import Factorization
 from contin.linalg.convergence import (
     CHORDS,
@@ -49,8 +49,6 @@ from contin.shown import shown
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.
 UNITS = 30
-#: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
-_COARSE = 1e-3
 #: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
 STAGNANT = 1e-6
 #: Returns the size of each unknown at x.
@@ -231,7 +229,7 @@ def _newton(
                 break
             if progress.wants_jacobian:
                 factors = None
-        coarse = _COARSE if sizes is not None else STAGNANT
+        coarse = ROUGH if sizes is not None else STAGNANT
         if size <= coarse and _is_noise(system, x, update, rows, coarse):
             return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
     raise _failure(progress.sizes)

@@ -30,14 +30,12 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.interpolated import meeting
 from contin.events.normal_forms import coefficient, flip, pair
-from contin.levels import APART
+from contin.levels import APART, ROUGH
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
 #: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
 _NEAR = 0.05
-#: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
-_DOUBLE = 1e-3
 #: Vectors are normal to each other where the cosine between them is smaller: their round-off.
 NORMAL = 1e-10
 
@@ -152,9 +150,9 @@ def _at_fold(label: str, name: str) -> Event:
     def confirm(trial: Trial) -> bool:
         curve: Any = trial.system
         exponents = curve.base.eigenvalues(curve.inside(trial.x))
-        own = 2 * (curve.own_unknowns and curve.frequency(trial.x) < _DOUBLE)  # the pair itself is one at R1
+        own = 2 * (curve.own_unknowns and curve.frequency(trial.x) < ROUGH)  # the pair itself is one at R1
         known = int(curve.base.autonomous) + own
-        return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
+        return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < ROUGH)
 
     return Event(label, name, lambda trial: cast(MultiplierCurve, trial.system).fold(trial.x), confirm=confirm)
 

@@ -15,8 +15,8 @@ from contin.equilibria.equations import AlgebraicEquations
 from contin.events.nearness import NO_MULTIPLIER
 from contin.functions.batch import Batch
 from contin.levels import DOUBLED
+from contin.linalg.layout import MANY
 from contin.linalg.periodic import log_eigenvalues
-from contin.linalg.sparse import MANY
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.own_names import ROUNDS, rounds_of
 

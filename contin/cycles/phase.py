@@ -10,13 +10,11 @@ import numpy as np
 from contin.arrays import Array
 from contin.cycles.equations import CycleEquations, ForcedEquations
 from contin.cycles.map_equations import MapEquations
+from contin.levels import ROUGH
 from contin.problems.angles import whole_rounds
 
 #: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
 _PLACES = 2048
-#: The image of a cycle is a cycle where its residual is below this part of that of -u(t), which is none, and has no error of an
-#: interpolation between nodes.
-_SAME = 1e-4
 #: Newton's steps from the best of these places to the best shift; the distance between places is small, three would do.
 _STEPS = 5
 
@@ -95,7 +93,7 @@ def _is_odd(system: ForcedEquations, x: Array) -> bool:
     image = system.moved(x, 0.5 / system.rounds)
     image[: system.state_size] *= -1
     size = np.abs(system.residual(np.where(np.arange(x.size) < system.state_size, -x, x))).max()
-    return bool(np.abs(system.residual(image)).max() <= _SAME * size)
+    return bool(np.abs(system.residual(image)).max() <= ROUGH * size)
 
 
 def _shift(system: CycleEquations, x: Array, reference: Array) -> float:

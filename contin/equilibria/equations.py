@@ -22,8 +22,9 @@ from contin.functions.batch import Batch, Columns
 from contin.levels import CORRECTED
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors
+from contin.linalg.layout import MANY
 from contin.linalg.rightmost import nearest, rightmost
-from contin.linalg.sparse import MANY, SparseFactors
+from contin.linalg.sparse import SparseFactors
 from contin.problems.angles import whole_rounds
 
 

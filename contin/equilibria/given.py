@@ -12,10 +12,7 @@ from contin.core.differences import derivative
 from contin.draws import ASIDE, generator, signs
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.levels import LOCATED
-
-#: Largest difference, in estimated errors of differences. Ten times larger, wrong entries of terms that are small pass.
-_SAFE = 20.0
+from contin.levels import CERTAIN, LOCATED
 
 
 class _Given(Protocol):
@@ -59,7 +56,7 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
             break
     else:
         return  # nothing to compare with: Newton's method will say that there are no values
-    excess = np.abs(matrix @ direction - wanted) - _SAFE * error - LOCATED * (terms + np.abs(wanted))
+    excess = np.abs(matrix @ direction - wanted) - CERTAIN * error - LOCATED * (terms + np.abs(wanted))
     if np.any(excess > 0):
         row = int(np.argmax(excess))
         given = matrix[[row]].toarray()[0] if hasattr(matrix, "toarray") else matrix[row]

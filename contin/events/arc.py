@@ -20,13 +20,11 @@ from contin.core.step import located
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
-from contin.levels import CORRECTED
+from contin.levels import CORRECTED, ROUGH
 from contin.shown import shown
 
 #: Part of the corrector's tolerance of a step to which a zero is located: what the corrector leaves is round-off of functions.
 _SHARE = 1e-2
-#: Part of a step to which the place is known from which Newton's method begins that holds an unknown: it does the rest.
-_ROUGH = 1e-3
 #: Points of the curve lie no further off the cubic than this part of the step; others belong to another branch.
 _OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
@@ -247,7 +245,7 @@ class Arc:
         row = np.zeros(system.size)
         row[at] = 1.0
         try:
-            there = self._corrected(self.guess(find_zero(gap, *ends, _ROUGH * self.step)), row, value)
+            there = self._corrected(self.guess(find_zero(gap, *ends, ROUGH * self.step)), row, value)
         except ConvergenceError:
             return None
         place = inner(system, state.tangent, there.x - state.x)

@@ -25,7 +25,7 @@ from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.normal_forms import pair
 from contin.events.root import find_zero
 from contin.events.spectra import find_moves, moves_of
-from contin.levels import DOUBLED
+from contin.levels import BESIDE, DOUBLED
 
 #: Into how many parts a step is divided to look inside it, on the cubic, ...
 _PARTS = 4
@@ -34,8 +34,6 @@ _PARTS = 4
 _CLOSER = 5
 #: ... and how often a piece is halved: crossings closer than 2^-20 of it are not told apart.
 _CUTS = 20
-#: Part of a step before and behind a Hopf point where its pair must lie on different sides of the axis, where that is in doubt.
-_BESIDE = 1e-3
 
 
 @functools.cache
@@ -248,7 +246,7 @@ def passes(arc: Arc, at: float, frequency: float) -> bool:
     One that is on the axis up to round-off at either place does not.
     """
     sides = []
-    for s in (at - _BESIDE * arc.step, at + _BESIDE * arc.step):
+    for s in (at - BESIDE * arc.step, at + BESIDE * arc.step):
         trial = arc.near(s)
         system: Any = trial.system
         values = system.eigenvalues(trial.x)

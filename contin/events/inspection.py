@@ -28,16 +28,12 @@ from contin.events.labelled import finding_of
 from contin.events.trivial import crossed, round_off
 from contin.events.zeros import separated
 from contin.functions.kernel_parts import helper
-from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED
+from contin.levels import APART, BESIDE, CORRECTED, DEPENDENT, DOUBLED, ROUGH
 
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
-#: A zero of a test function that also vanishes at a fold or branch point nearer than this part of the step is that point: the
-#: place of a fold is known to 2e-4 of a step. Ten times larger, a second zero beside it could be passed.
-_CLOSE = 1e-3
 #: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
-_BESIDE = 1e-4
 _STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
@@ -209,7 +205,7 @@ class Inspection:
             point = self.arc.locate(test, left, right)
             if not point.is_located and (special := self._nearly(test, crossings)) is not None:
                 point = self._at_special(test, special)
-            again = any(abs(point.at - other.at) < _CLOSE * self.arc.step for other in same)
+            again = any(abs(point.at - other.at) < ROUGH * self.arc.step for other in same)
             if not again and (test.confirm is None or test.confirm(point.trial)):
                 found.append(point)
             if test.terminal:
@@ -235,7 +231,7 @@ class Inspection:
 
     def _pieces(self, test: Event, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
-        arc, aside = self.arc, _BESIDE * self.arc.step
+        arc, aside = self.arc, BESIDE * self.arc.step
         parts = [part / (test.looks + 1) for part in range(1, test.looks + 1)]
         between = separated(arc, test, self._knots, parts, dips=False) if test.looks else self._knots
         if not same:

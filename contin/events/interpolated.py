@@ -29,6 +29,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import Finding
 from contin.events.root import find_zero
+from contin.levels import BESIDE, ROUGH
 
 #: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate.
 _NODES = 12, 10
@@ -37,10 +38,6 @@ _NODES = 12, 10
 _WIDTHS = (2.0, 1.0, 0.5, 0.25)
 #: Points that an extrapolation goes through, at most, and points without one, which lie close to the beginning of the step.
 _BEHIND, _FEWEST = 6, 2
-#: At the zero of the first test function the others are below this part of their largest value.
-_TOGETHER = 1e-3
-#: Parameters turn at a point where their part of the unit tangent is below this: interpolated tangents are better known.
-_TURNS = 1e-4
 
 #: Functions of a trial point.
 Functions = Sequence[Callable[[Trial], float]]
@@ -156,7 +153,7 @@ def meeting(arc: Arc, test: Event, functions: Functions, small: float, stops: st
     found = interpolated_zero(arc, functions, near)
     if found is None:
         return None
-    turns_back = np.abs(found.trial.tangent[arc.state.system.state_size :]).max() < _TURNS
+    turns_back = np.abs(found.trial.tangent[arc.state.system.state_size :]).max() < BESIDE
     stop = Stop(Reason.PITCHFORK, stops) if turns_back else None
     return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
 
@@ -201,7 +198,7 @@ def _interpolated(window: Window, points: Sequence[Trial], functions: Functions)
     if not left[1] * right[1] < 0:
         raise ConvergenceError("no zero in the middle half of the window")
     at = find_zero(lambda place: float(test(place)[0]), left, right, np.finfo(float).eps * window.width)
-    if np.any(np.abs(test(at)) > _TOGETHER * np.abs(values).max(axis=0)):
+    if np.any(np.abs(test(at)) > ROUGH * np.abs(values).max(axis=0)):
         raise ConvergenceError("the test functions have no common zero")
     unknowns = np.array([point.x for point in points])
     through = _polynomial(window, unknowns)

@@ -26,7 +26,7 @@ from contin.core.protocol import Carrier, Discretization, inner
 from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
-from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUND_OFF, TINY
+from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH, ROUND_OFF, TINY
 from contin.linalg.border import orthonormal
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
 from contin.linalg.singular import smallest_directions
@@ -42,8 +42,6 @@ _LONGEST = 0.5
 _AWAY, _NEAREST = 1e-3, 1e-5
 #: The branch is looked at so many times further off than a cluster is long, at so many distances at most.
 _BEYOND, _LOOKS = 10.0, 5
-#: Directions closer than this are one.
-_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +333,7 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
             continue
         direction = 2 * a - nearest
         direction = direction / np.linalg.norm(direction)
-        if all(abs(direction @ other) < 1 - 1e-2 * _SAME for other in result):
+        if all(abs(direction @ other) < 1 - 1e-2 * ROUGH for other in result):
             result.append(direction)
     return result, False
 
@@ -382,6 +380,6 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
             break
     found: list[Array] = []
     for end in ends[errors < LOCATED]:
-        if not found or np.linalg.norm(np.array(found) - end, axis=1).min() > _SAME:
+        if not found or np.linalg.norm(np.array(found) - end, axis=1).min() > ROUGH:
             found.append(end)
     return found

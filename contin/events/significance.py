@@ -21,14 +21,11 @@ from contin.core.step import CLEAR, trial_of
 from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
-from contin.levels import ROUND_OFF
+from contin.levels import BESIDE, ROUND_OFF
 from contin.linalg.orientation import oriented
 
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
 STANDS = 1e-13
-#: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
-#: times larger, another fold could lie between.
-_BESIDE = 1e-4
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5
 #: One up to this is not, on a mesh: one that agrees is round-off, too.
@@ -93,7 +90,7 @@ def growing(system: Discretization, x: Array, tangent: Array, primary: str, newt
         return found
     row = system.weights * tangent
     try:
-        places = [correct(system, x + s * tangent, row, row @ x + s, newton).x for s in (-_BESIDE, _BESIDE)]
+        places = [correct(system, x + s * tangent, row, row @ x + s, newton).x for s in (-BESIDE, BESIDE)]
     except ConvergenceError:
         return np.asarray(oriented(tangent))
     before, behind = (linearization(system, place, row).tangent[at] for place in places)

@@ -12,10 +12,8 @@ import numpy as np
 
 from contin.core.newton import Newton
 from contin.core.trial import Trial, sign_changed
-from contin.levels import CERTAIN
+from contin.levels import CERTAIN, ROUND_OFF
 
-#: The tolerance counts as no less than this: round-off of residuals is not below it however small the tolerance is.
-_LEAST = 1e-13
 #: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or
 #: a decay is fast: all are then taken in shorter steps. At 10 a decay beside a homoclinic orbit would be cut into many steps,
 #: at 1e6 a jump from a branch of small amplitude would pass.
@@ -24,7 +22,7 @@ _CLEAR = 1e3
 
 def round_off(trial: Trial, name: str, newton: Newton) -> float:
     """Return about how large the quantity can be by errors of the corrector alone."""
-    relative = CERTAIN * max(newton.tolerance, trial.newton_error, _LEAST)
+    relative = CERTAIN * max(newton.tolerance, trial.newton_error, ROUND_OFF)
     system = trial.system
     if name in system.free:
         at = system.parameter_index(name)

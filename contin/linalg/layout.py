@@ -14,8 +14,9 @@ import numpy as np
 from contin.arrays import Pattern
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack
 
-#: Problems of more states are one group. The search for groups takes up to .1 s for 200 states.
-_MOST_STATES = 200
+#: Unknowns that are many: dense factors of 200 take as long as sparse ones, the search for groups of states takes up to .1 s,
+#: and what is done for each of them takes longer than a run.
+MANY = 200
 
 
 class Blocks(NamedTuple):
@@ -126,7 +127,7 @@ def coupled_groups(depends: Pattern) -> list[list[int]]:
     They are sorted by the number of states that can be reached from them, those of one number by their states.
     """
     n = len(depends)
-    if n > _MOST_STATES or np.all(depends):
+    if n > MANY or np.all(depends):
         return [list(range(n))]
     paths, known = (depends | np.eye(n, dtype=bool)).astype(np.float32), 0  # of one step at most; then of 2, 4, ...
     while known != (known := int(np.count_nonzero(paths))):

@@ -10,8 +10,6 @@ import numpy as np
 
 from contin.arrays import Array, Function, Indices
 
-#: Smallest number of unknowns for which a matrix is kept sparse: dense factors of 200 unknowns take as long as sparse ones.
-MANY = 200
 #: Border rows are scaled to this part of the matrix: one becomes a pivot only where all other entries are smaller. Otherwise
 #: they would become pivots anywhere, and fill the factors. Pivots that small lose nine digits; refinement gives them back.
 _BORDER = 2.0**-30

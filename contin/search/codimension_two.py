@@ -30,6 +30,7 @@ from contin.equilibria.folds import HOMOCLINIC
 from contin.equilibria.lyapunov import critical_pair
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
+from contin.levels import ROUGH
 from contin.results.point import Point
 from contin.search.cycle_starts import small_cycle
 from contin.search.takens import Takens
@@ -38,8 +39,6 @@ from contin.search.takens import Takens
 _AMPLITUDES = (1e-2, 1e-3, 1e-1)
 #: Sizes of first homoclinic orbits as parts of `Takens.rate`, in the order in which they are tried.
 _SIZES = (0.1, 0.2, 0.05, 0.4)
-#: Part of a size by which it is changed for the tangent: differences are right to its square.
-_CHANGE = 1e-3
 #: Part of the size of a first guess by which it may be corrected: what it leaves out is of second order.
 _OFF = 0.5
 
@@ -161,7 +160,7 @@ def _homoclinic(base: Algebraic, x: Array) -> First:
     for share in _SIZES:
         size = share * takens.rate
         system, y, distance = takens.guess(size)
-        larger, smaller = (takens.guess(size * factor)[1] for factor in (1 + _CHANGE, 1 - _CHANGE))
+        larger, smaller = (takens.guess(size * factor)[1] for factor in (1 + ROUGH, 1 - ROUGH))
         change = larger - smaller
         found = _corrected(system, y, change / float(np.sqrt(system.weights @ change**2)), distance)
         if found is not None:

@@ -13,12 +13,10 @@ from contin.connections.system import ConnectionCollocation
 from contin.core.labels import Label
 from contin.core.trial import Trial, linearization
 from contin.errors import ProblemError
+from contin.levels import BESIDE
 from contin.problems.angles import winding_names
 from contin.problems.own_names import TIME
 from contin.results.point import Point
-
-#: Part of the tangent along which the sense of the new curve is looked at: differences of what is known to 1e-10.
-_ALONG = 1e-4
 
 
 def leaves_saddle_node(point: Point) -> bool:
@@ -54,5 +52,5 @@ def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]
     row[other.parameter_index(system.free[0])] = 1.0
     tangent = linearization(other, point.x, row).tangent
     inside = ending(other, side).function
-    beside = [inside(Trial.without_tangent(other, point.x + way * _ALONG * tangent)) for way in (1, -1)]
+    beside = [inside(Trial.without_tangent(other, point.x + way * BESIDE * tangent)) for way in (1, -1)]
     return other, point.x, tangent if beside[0] > beside[1] else -tangent

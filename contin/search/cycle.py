@@ -13,7 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
-from contin.levels import LOCATED
+from contin.levels import LOCATED, ROUGH
 from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
@@ -22,7 +22,7 @@ from contin.search.solving import solve
 
 #: A motion that is further off, relative to 1 + where it began, goes to infinity: towards a pole steps of the integrator shrink
 #: without end. Ten times larger, it takes a step or two more.
-_FAR = 1e12
+FAR = 1e12
 #: Tolerance of the integration while the motion settles, relative and absolute. With 1e-9 `cycle` takes twice as long. A motion
 #: smaller than this part of 1 + its largest state is at rest.
 _SETTLES = 1e-6
@@ -36,9 +36,6 @@ _PER_ROUND = 8
 _SAMPLES = 1000
 #: Largest number of periods of the forcing after which a motion is looked for to close: four period doublings.
 _MOST_ROUNDS = 16
-#: Distance from its start, as a part of its size, at which a forced motion closes: ten times larger, a doubled cycle close to
-#: its bifurcation would be taken for one period.
-_CLOSED = 1e-3
 
 
 @checks.arguments
@@ -117,7 +114,7 @@ def _vector_field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
 def _integrated(field: Field, start: Array, time: float, tolerance: float, dense: bool = False) -> Any:
     from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # .3 s; only this needs it
 
-    far = _FAR * (1 + np.abs(start).max(initial=0.0))
+    far = FAR * (1 + np.abs(start).max(initial=0.0))
 
     def escapes(_: float, u: Array) -> float:
         return float(far - np.abs(u).max(initial=0.0))
@@ -163,7 +160,7 @@ def _forced_rounds(
     periods = periods_of(problem)
     size = _size(done.y, periods) or 1.0
     for rounds in range(1, _MOST_ROUNDS + 1):
-        if np.abs(_apart(done.sol(rounds * period), settled, periods)).max() <= _CLOSED * size:
+        if np.abs(_apart(done.sol(rounds * period), settled, periods)).max() <= ROUGH * size:
             times = np.linspace(0.0, rounds * period, _SAMPLES)
             return (times, done.sol(times).T), rounds
     raise ProblemError(

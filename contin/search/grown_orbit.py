@@ -21,10 +21,11 @@ import numpy as np
 from contin.arrays import Array
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
-from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS
+from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH
 from contin.linalg.orientation import oriented
 from contin.problems.angles import periods_of, whole_rounds
 from contin.results.point import Point
+from contin.search.cycle import FAR
 
 #: Most steps of the integration: orbits take a few hundred.
 _STEPS = 10_000
@@ -34,12 +35,8 @@ _LONGEST = 500.0
 _BACK = 0.95
 #: Values of the parameter on each side that are looked at, closer to each other near the start, as the saddle may end there.
 _VALUES = 24
-#: Distance at which an orbit has come back, as a part of its largest one: Newton's method then finds the homoclinic orbit.
-_CLOSE = 1e-3
 #: Where the interval cannot be halved any more, an orbit further off than this part of its largest distance shows a jump of m.
 _JUMP = 0.05
-#: An orbit that is this far away, relative to 1 + the states of the saddle, is on its way to infinity.
-_LOST = 1e6
 #: The orbit is cut off at the start where it is this close to the saddle, as a part of its largest distance.
 _CUT = 1e-4
 
@@ -181,7 +178,7 @@ def _bisected(saddle: _Saddle, first: GrownOrbit, second: GrownOrbit, direction:
     """Return an orbit between two, on different sides, that comes back close to the saddle; None where m jumps there."""
     for _ in range(MOST_HALVINGS):
         best = min(first, second, key=lambda orbit: orbit.closest)
-        if best.closest < _CLOSE:
+        if best.closest < ROUGH:
             return best
         middle = (first.value + second.value) / 2
         if middle in (first.value, second.value):
@@ -235,7 +232,7 @@ def _until_return(saddle: _Saddle, value: float, rest: Array, start: Array, long
     while solver.status == "running" and len(times) < _STEPS:
         solver.step()
         u, before = solver.y.copy(), last
-        if solver.status == "failed" or not np.abs(u - rest).max() < _LOST * (1 + np.abs(rest).max()):
+        if solver.status == "failed" or not np.abs(u - rest).max() < FAR * (1 + np.abs(rest).max()):
             return None
         last, between = approach(solver.t, u), solver.dense_output()
         farthest = max(farthest, distance(u))

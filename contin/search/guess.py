@@ -15,16 +15,12 @@ from contin.boundary.system import Collocation
 from contin.core.system import System
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
-from contin.levels import LOCATED
+from contin.levels import LOCATED, ROUGH
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.results.point import Point, underlying
 from contin.results.record import over_t
 from contin.search.lagrange import with_guessed_multipliers
-
-#: A mesh point of a guess that lies closer to the end of the part that is computed is left out. Ten times
-#: larger, the first mesh has a longer interval there; it is adapted in any case.
-_LEAST_INTERVAL = 1e-3
 
 #: A function of t, a point, numbers, (t, states), or one of these for each segment.
 Guess = Callable[[float], Any] | Point | float | Sequence[Any] | Array | None
@@ -260,7 +256,7 @@ def _mesh_of(system: Collocation, order: int) -> Array:
     if parts == order:
         return system.mesh
     whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts
-    return np.append(whole[whole < 1 - _LEAST_INTERVAL], 1.0)
+    return np.append(whole[whole < 1 - ROUGH], 1.0)
 
 
 def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:

@@ -24,9 +24,7 @@ from contin.problems.statement import declared
 from contin.results.point import Point
 from contin.search.grown_orbit import grown_orbit
 from contin.search.solving import solved
-
-#: Intervals of the first mesh of an orbit that was grown: of the order of those that it takes.
-_INTERVALS = 60
+from contin.search.takens import INTERVALS
 
 
 @checks.arguments
@@ -120,7 +118,7 @@ def _from_saddle(
     values |= dict(zip(problem.multipliers, rest))
     times = orbit.times / orbit.times[-1]
     degree = usual_degree(len(states), options[0].tolerance)
-    every = max(1, len(times) // _INTERVALS)
+    every = max(1, len(times) // INTERVALS)
     points = np.append(times[:-1:every], 1.0)
     started = ConnectionCollocation(problem, points, degree, names, values)
     x = started.pack(np.stack([np.interp(started.nodes, times, column) for column in orbit.states.T], axis=1), values)

@@ -9,11 +9,9 @@ import numpy as np
 from contin.arrays import Array
 from contin.boundary.system import Collocation
 from contin.errors import ProblemError
-from contin.levels import MOST_HALVINGS, MOST_UPDATES, ROUND_OFF
+from contin.levels import MOST_HALVINGS, MOST_UPDATES, ROUGH, ROUND_OFF
 from contin.problems.statement import multipliers_of
 
-#: The iteration ends with a step that gains less than this part of the residual: Newton's method goes on from there.
-_SETTLED = 1e-3
 #: The most intervals on which multipliers are looked for: the equations are solved densely. Newton's method does the rest.
 _MOST_INTERVALS = 20
 
@@ -83,7 +81,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
             break
         gained = np.linalg.norm(residual) - np.linalg.norm(new[0])
         lam, multipliers, (residual, gradient, normal) = new_lam, new_multipliers, new
-        if gained <= _SETTLED * np.linalg.norm(residual) or np.linalg.norm(residual) < _SETTLED:
+        if gained <= ROUGH * np.linalg.norm(residual) or np.linalg.norm(residual) < ROUGH:
             break
     return lam, multipliers
 

@@ -27,7 +27,7 @@ from contin.errors import ProblemError
 from contin.problems.own_names import TIME
 
 #: Intervals of the first mesh; it is adapted in any case.
-_INTERVALS = 40
+INTERVALS = 60
 #: Half of the time, in units of 1 / size: cut off there, the orbit ends at a distance of 2e-5 of its size from the saddle.
 _HALF = 7.0
 
@@ -109,7 +109,7 @@ class Takens:
 
     def orbit(self, size: float) -> tuple[Array, Array, Array]:
         """Return times from 0 to 1, the states of the homoclinic orbit there (K, n), and the two parameters."""
-        s = np.linspace(-_HALF, _HALF, _INTERVALS * CYCLE_DEGREE + 1)
+        s = np.linspace(-_HALF, _HALF, INTERVALS * CYCLE_DEGREE + 1)
         w = size**2 / self.a * (2 - 6 / np.cosh(s) ** 2)
         z = 12 * size**3 / self.a * np.sinh(s) / np.cosh(s) ** 3
         states = self._states(size, w, z)
