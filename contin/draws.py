@@ -24,7 +24,7 @@ def generator(name: str) -> np.random.Generator:
 
 def signs(random: np.random.Generator, like: Array) -> Array:
     """Return random signs, of the shape of an array."""
-    found: Array = random.choice((-1.0, 1.0), like.shape)
+    found: Array = np.copysign(1.0, random.random(like.shape) - 0.5)
     return found
 
 

@@ -12,7 +12,6 @@ from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
-from contin.core.rounding import LAST_PLACES
 from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import standing_at
@@ -22,20 +21,13 @@ from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, Finding, finding_of
+from contin.levels import BESIDE, CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES
 from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
-#: The secant method begins with a step of this length. A hundred times larger, period doublings that saturate are found with a
-#: step more; a hundred times smaller, slopes are lost in round-off where a parameter nearly stands still.
-_FIRST = 1e-4
-#: It ends where the product of the distances to both places of the secant is below this: times half the curvature of the
-#: function, as a part of its slope, that is the error.
-_LAST = 1e-15
-#: Most secants: 2 or 3 are needed.
-_SECANTS = 12
 #: A value that is not below this part of the nearest to zero came no nearer. Ten times smaller, secants that still come nearer
 #: count as round-off; ten times larger, round-off that is smaller by chance does not.
 _NEARER = 0.1
@@ -45,13 +37,9 @@ _BLURRED = 2
 #: is looked at grow by the first factor, its values at least by the second. Round-off does not grow, and a square root does by
 #: 3.2. The ± is too large by the square of the first at most.
 _WIDER, _GROWS = 10.0, 3.0
-#: The least of these distances.
-_NARROWEST = 1e-9
 #: Distance over which slopes are taken, of an unknown or along the tangent: the cube root of round-off. In a canard explosion
 #: multipliers change by a tenth of their value where it is a thousand times longer.
 ASIDE = 1e-5
-#: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-15 on the first step.
-_FLAT = 1e-12
 #: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
 _AWAY = 1.0
 
@@ -271,12 +259,12 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     value = test.function(here)
     if value == 0:
         return here, 0.0
-    beside = at(_FIRST)
-    best, other = (0.0, value, here), (_FIRST, test.function(beside), beside)
-    slope, blurred = abs(other[1] - value) / _FIRST, [0.0]
-    for _ in range(_SECANTS):
+    beside = at(BESIDE)
+    best, other = (0.0, value, here), (BESIDE, test.function(beside), beside)
+    slope, blurred = abs(other[1] - value) / BESIDE, [0.0]
+    for _ in range(MOST_UPDATES):
         best, other = sorted((best, other), key=lambda place: abs(place[1]))
-        if best[1] == 0 or (test.label == Label.FOLD and abs(other[1]) < _FLAT):
+        if best[1] == 0 or (test.label == Label.FOLD and abs(other[1]) < CORRECTED):
             return best[2], 0.0  # where a parameter stands still all around, its value there is that of the fold
         if len(blurred) > _BLURRED or best[1] == other[1]:
             break  # the function is round-off, or does not depend on the place and is not zero
@@ -284,11 +272,11 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
         if not abs(s) <= _AWAY:
             break  # such a zero is another one, or the function is round-off
         trial = at(s)
-        if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < _LAST:
+        if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < LAST_PLACES:
             return trial, 0.0
         other = s, test.function(trial), trial
         blurred = [*blurred, abs(other[1])] if abs(other[1]) > _NEARER * abs(best[1]) else [0.0]
-    if len(blurred) > _BLURRED and max(blurred) < slope * _FIRST:
+    if len(blurred) > _BLURRED and max(blurred) < slope * BESIDE:
         return best[2], max(blurred) / slope
     return here, _known_to(lambda s: test.function(at(s)))
 
@@ -301,7 +289,7 @@ def _known_to(function: Callable[[float], float]) -> float:
     ConvergenceError
         There is none: the function has no zero there, or is round-off.
     """
-    apart, values = _NARROWEST, np.zeros(2)
+    apart, values = LOCATED, np.zeros(2)
     while apart <= _AWAY:
         before, values = values, np.array([function(-apart), function(apart)])
         if before[0] * before[1] < 0 and np.all(values / before > _GROWS):
