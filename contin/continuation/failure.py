@@ -12,7 +12,7 @@ from contin.continuation.notes import Notes
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, State, Stop
-from contin.core.step import LONGER, aims, corrected, judged, predict
+from contin.core.step import aims, corrected, judged, predict
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError
@@ -28,6 +28,8 @@ _LOOSER = (1e3, 1e4, 1e5)
 #: An advice must let the run go on for so many steps, and over ``min_step`` or, with a looser tolerance, as far as a first
 #: step: one step may succeed right before what ends the run.
 _STEPS = 10
+#: Each of them is tried so much longer than the one before.
+_LONGER = 1.5
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
@@ -165,7 +167,7 @@ def _goes_on(state: State, settings: Settings, way: float) -> bool:
             state, x=trial.x, tangent=trial.tangent, previous_tangent=state.tangent, previous_step=step, singular=False
         )
         gone += step
-        step = min(LONGER * step, settings.max_step)
+        step = min(_LONGER * step, settings.max_step)
     return False
 
 

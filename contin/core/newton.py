@@ -282,8 +282,8 @@ def nearest_zero(linearized: Callable[[Array], tuple[Array, Array]], x: Array) -
     Examples
     --------
     >>> root = nearest_zero(lambda x: (x * x - 2, 2 * x[:, None]), np.array([1.0]))
-    >>> print(root.round(12))
-    [1.414213562373]
+    >>> print(round(float(root[0]), 12))
+    1.414213562373
     """
     for _ in range(MOST_UPDATES):
         values, matrix = linearized(x)

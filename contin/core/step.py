@@ -40,7 +40,7 @@ ASTRAY = 2.5
 #: larger, more steps on a mesh take twice as long.
 CLEAR = 1e-6
 #: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
-_SHORTER, LONGER, _AIM = 0.3, 2.0, 0.8
+_SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
 #: the curvature, it is one half.
 _MISSED = 0.75
@@ -211,9 +211,9 @@ def following_step(
     step: float, missed: float, turn: float, order: int, accuracy: float, angle: float, shortest: float, longest: float
 ) -> float:
     """Return the next step: one whose prediction, with an error of this order, misses ``accuracy`` of it."""
-    factor = LONGER if missed == 0 else (accuracy * step / missed) ** (1 / order)
+    factor = _LONGER if missed == 0 else (accuracy * step / missed) ** (1 / order)
     factor = min(factor, _AIM * angle / max(turn, CORRECTED))
-    return min(max(step * min(max(factor, _SHORTER), LONGER), shortest), max(longest, shortest))
+    return min(max(step * min(max(factor, _SHORTER), _LONGER), shortest), max(longest, shortest))
 
 
 class BothEnds(NamedTuple):

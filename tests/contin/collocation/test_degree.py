@@ -19,8 +19,8 @@ PAGE = Path(__file__).parents[3] / "docs" / "collocation.md"
 
 
 def newton_time(states, d, intervals):
-    """The law of the documentation: a + N (b + c (n d)^2)."""
-    return degree._ITERATION + intervals * (degree._INTERVAL + degree._ENTRY * (states * d) ** 2)
+    """The law of the documentation: a + N (b + c (n d)^2), over a."""
+    return 1 + intervals * (degree._INTERVAL + degree._ENTRY * (states * d) ** 2)
 
 
 def test_table_of_the_documentation():
