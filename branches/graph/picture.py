@@ -30,12 +30,12 @@ _BELOW = 3.8
 _INSETS, _NUMBERS, _SEARCH = ((0.5, 0.21), (0.36, 0.16), (0.3, 0.12)), (0.07, 0.06), 0.02
 #: Colour of secondary branches, which have no wavenumber.
 _NO_WAVE = "#000000"
-#: Largest step in kappa_n of what is drawn, far less than the diagrams' 22; and into how many parts a step is cut at most.
-_STEP, _MOST_PARTS = 0.05, 200
+#: Largest step in kappa_n of what is drawn, far less than the diagrams' 22.
+_STEP = 0.05
+#: Parts into which a step is cut at most, and a circle, whose kappa* is no straight line if the law is not linear.
+_PARTS = 200
 #: Widths of branches in a diagram, by whether they are stable; None: not known.
 _WIDTHS = {True: 3.4, False: 1.4, None: 1.4}
-#: Places of a circle at which kappa* is computed; it is no straight line if the law is not linear.
-_ALONG = 200
 #: How circles are drawn.
 _CIRCLES: dict[str, dict] = {
     "unstable": {"color": UNSTABLE, "lw": 0.9, "ls": LINES[False][0]},
@@ -335,7 +335,7 @@ def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> No
     material, parameters = law_of(law, nu)
 
     def plot(m, ends, **style):
-        along = np.linspace(*np.clip(ends, *window), _ALONG)
+        along = np.linspace(*np.clip(ends, *window), _PARTS)
         height = [m if level else circle(material, m, kappa_n, parameters)["kappa_star"] for kappa_n in along]
         axes.plot(along, height, zorder=1, **style)
 
@@ -427,7 +427,7 @@ def _line(graph, m: int, n: int, edges) -> Line:
 
 def _refined(kappa_n, kappa_star, index) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same polyline with more points: steps in kappa_n are at most `_STEP`, so that heights can change between them."""
-    parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _MOST_PARTS).astype(int)
+    parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _PARTS).astype(int)
     number = np.arange(len(kappa_n))
     within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     fine = np.append(np.repeat(number[:-1], parts) + within / np.repeat(parts, parts), number[-1])

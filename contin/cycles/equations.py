@@ -22,6 +22,7 @@ from contin.core.protocol import Carrier
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.core.spectral import KEPT
+from contin.draws import ASIDE
 from contin.errors import ProblemError
 from contin.functions.batch import Columns
 from contin.levels import APART, DOUBLED, LOCATED
@@ -39,10 +40,6 @@ _SPLIT = 100.0
 #: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
 #: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
 _PERIOD_SHARE = 0.1
-
-
-#: Free parameters are multiplied by this to see whether a break of the forcing moves.
-_OTHERWISE = 1.01
 
 
 class PeriodicEquations(Collocation):
@@ -340,7 +337,7 @@ class ForcedEquations(PeriodicEquations):
     def breaks(self) -> Array:
         """Places on the unit interval where the forcing has jumps or corners that no free parameter moves: t = s T(p)."""
         moved = self.parameters.copy()
-        moved[self._free] *= _OTHERWISE
+        moved[self._free] *= 1 + ASIDE
         here, there = (breaks_of(self.problem.batch("field"), self.problem.domain, p) for p in (self.parameters, moved))
         still = np.abs(here[:, None] - there) <= LOCATED if there.size else np.zeros((here.size, 1), dtype=bool)
         found: Array = here[still.any(axis=1)]

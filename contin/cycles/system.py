@@ -21,10 +21,8 @@ from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.normal_forms import at_special_point
+from contin.levels import LOCATED
 from contin.problems.own_names import PERIOD
-
-#: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
-_DIGITS = 9
 
 
 class PeriodicCollocation(OfCycles, PeriodicEquations):
@@ -99,7 +97,7 @@ class CycleCollocation(PeriodicCollocation, CycleEquations):
 
     def standstill(self, trial: Trial, primary: str) -> Stop:
         """Return the end of a family at one value of the parameter: cycles of a Hamiltonian or linear system fill an area."""
-        value = round(trial[primary], _DIGITS) + 0.0
+        value = LOCATED * round(trial[primary] / LOCATED) + 0.0
         message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
         if primary == PERIOD:
             return Stop(Reason.STANDSTILL, message, "all its cycles have this period; follow another parameter")

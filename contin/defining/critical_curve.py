@@ -28,12 +28,8 @@ from contin.core.trial import Event, Trial
 from contin.defining.system import Defining
 from contin.events.coefficient import Coefficient
 from contin.events.normal_forms import Form
-from contin.levels import APART
+from contin.levels import APART, ROUGH
 from contin.linalg.border import Bordered, null_vectors
-
-#: The imaginary parts of null vectors count where that of the eigenvalue is larger than this; they vanish with it, and are
-#: divided by it. Ten times larger or smaller, the curves of the tests are the same.
-_ALMOST_REAL = 1e-2
 
 
 class CriticalCurve(Defining):
@@ -109,7 +105,7 @@ class CriticalCurve(Defining):
     def _single(self, x: Array, found: Bordered) -> tuple[Any, Any]:
         """Return the left and the right null vector of one copy; where the pair is almost real, their real parts."""
         (right, left), r = self._by_copies(found), self.imaginary_part(x)
-        if r > _ALMOST_REAL * math.sqrt(self.kappa_size):
+        if r > ROUGH * math.sqrt(self.kappa_size):
             return left[0, 0] + 1j / r * left[0, 1], right[0] + 1j * r * right[1]
         return left[0, 0], right[0]
 

@@ -26,12 +26,11 @@ from contin.linalg.orientation import ordered, oriented, oriented_along
 
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
 _SAME_KERNEL = 0.9
-#: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
+#: An update at least this part of the one before is expected to follow, with a new Hessian: between new Hessians convergence is
+#: linear.
 _LINEAR = 0.1
 #: Small updates that shrink by less than this factor are round-off.
 _SHRINKING = 0.3
-#: An update is followed by a new Hessian where it is more than this part of the one before.
-_SLOW = 0.05
 #: An update larger than this, relative to 1 + |x|, leaves the neighbourhood for good.
 _GONE = 10
 #: Where the Hessian explains less of the gradient than one half it does not lead to a zero.
@@ -271,7 +270,7 @@ class _Search:
 
     def prepare(self) -> None:
         """Drop the Hessian where the last update was not much smaller than the one before."""
-        if self.size > _SLOW * self.before:
+        if self.size > _LINEAR * self.before:
             self._hessian = None
         self.before = self.size
 

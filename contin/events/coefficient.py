@@ -12,11 +12,11 @@ import numpy as np
 
 from contin import draws
 from contin.arrays import Array, Numbers
-from contin.levels import APART, CERTAIN, LOCATED, ROUND_OFF
+from contin.levels import APART, CERTAIN, LOCATED, ROUGH, ROUND_OFF
 
-#: A value above this part of its terms, with terms below this size, is no error: that is not estimated. Near where it is
+#: A value that is not small beside its terms is no error, with terms below this size: that is not estimated. Near where it is
 #: infinite the terms are large: 2e7 at the doubling of Hénon's map with a Jacobian of -1 + 1e-7.
-_CLEAR, _MODERATE = 1e-3, 1e6
+_MODERATE = 1e6
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Coefficient:
     @property
     def is_certain(self) -> bool:
         """Its terms do not cancel, and are so small that it cannot be an error."""
-        return abs(self.value) > _CLEAR * self.size and self.size < _MODERATE
+        return abs(self.value) > ROUGH * self.size and self.size < _MODERATE
 
     @property
     def vanishes(self) -> bool:

@@ -43,7 +43,7 @@ _SAME_WAY = 0.5
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 REACH = 2
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
-_SAME, _SAME_SHARE = 1e-4, 2e-3
+_SAME_SHARE = 2e-3
 #: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
 _EXPLAINED = 2.0
 
@@ -328,7 +328,7 @@ class Inspection:
             return False
         if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
             return True
-        near = _SAME + _SAME_SHARE * self.arc.step
+        near = BESIDE + _SAME_SHARE * self.arc.step
         close = [other for other in others if np.max(np.abs(fold.trial.x - other.trial.x)) < near]
         return any(not self._is_beside(fold, other) for other in close)
 
