@@ -1,4 +1,4 @@
-"""Measure the private constants of contin: changes on the bank of test problems if one is ten times larger, or smaller.
+"""Measure the levels of error and the private constants of contin: changes on the bank of test problems if one is ten times larger, or smaller.
 
     python scripts/constants.py                 # all of them, a line each; takes minutes
     python scripts/constants.py _FAR _CHORDS    # these only
@@ -27,7 +27,10 @@ SLOW = ("kar", "bru", "spb")
 
 
 def constants() -> Iterator[tuple[str, str]]:
-    """Yield (module, name) of every private constant that is a number."""
+    """Yield (module, name) of every level of error, and of every private constant that is a number."""
+    for name, value in vars(importlib.import_module("contin.levels")).items():
+        if isinstance(value, float):
+            yield "contin.levels", name
     for path in sorted((ROOT / "contin").glob("*/*.py")):
         if path.parent.name in OTHERS:
             continue
@@ -71,13 +74,13 @@ def _counted(linearize, count):
 
 
 def main() -> int:
+    sys.path.insert(0, str(ROOT))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="constants; all by default")
     parser.add_argument("--one", nargs=3, metavar=("MODULE", "NAME", "FACTOR"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
         module, name, factor = arguments.one
-        sys.path.insert(0, str(ROOT))
         if module:
             changed = importlib.import_module(module)
             setattr(changed, name, type(getattr(changed, name))(getattr(changed, name) * float(factor)))
