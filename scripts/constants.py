@@ -1,4 +1,4 @@
-"""Measure the levels of error and the private constants of contin: changes on the bank of test problems if one is ten times larger, or smaller.
+"""Measure levels of error and private constants of contin: changes on the bank if one is ten times larger, or smaller.
 
     python scripts/constants.py                 # all of them, a line each; takes minutes
     python scripts/constants.py _FAR _CHORDS    # these only
