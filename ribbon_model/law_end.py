@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contin import Event
-from contin.lowlevel import Collocation, Continuation, Label, Trial
-from contin.lowlevel import levels
+from contin.lowlevel import Collocation, Continuation, Label, Trial, levels
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.law import Law
 

@@ -39,9 +39,8 @@ from contin import (
     solve,
     trace,
 )
-from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
+from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
-from contin.lowlevel import levels
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.members import (

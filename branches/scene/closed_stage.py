@@ -17,8 +17,7 @@ from branches.scene.fields import ConfigError, StepConfig
 from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
 from branches.scene.stage import Stage
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
-from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text
-from contin.lowlevel import levels
+from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels
 from ribbon_model import law_end
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.law_end import NEARLY_ENDED

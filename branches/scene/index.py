@@ -8,8 +8,7 @@ from threadpoolctl import ThreadpoolController
 from branches.scene.columns import Change
 from branches.scene.stage import Watch
 from contin import ConvergenceError, Event
-from contin.lowlevel import Label, correct
-from contin.lowlevel import levels
+from contin.lowlevel import Label, correct, levels
 from ribbon_model.law_end import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode

@@ -17,8 +17,7 @@ from branches.scene.labels import CONJUGATE, label_of, without_round_off
 from branches.scene.open_strip import OpenScene, StagedScene
 from branches.scene.stage import Stage, Watch
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
-from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, point_of
-from contin.lowlevel import levels
+from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
 from ribbon_model.loads import STROKE

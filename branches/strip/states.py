@@ -10,8 +10,7 @@ import numpy as np
 
 from branches.run.progress import Progress
 from contin import Settings, trace
-from contin.lowlevel import Label, point_of
-from contin.lowlevel import levels
+from contin.lowlevel import Label, levels, point_of
 from ribbon_model import law_end, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH

@@ -30,8 +30,6 @@ STANDS = 1e-13
 _AGREES = 0.5
 #: One up to this is not, on a mesh: one that agrees is round-off, too.
 STILL = ROUND_OFF / (1 + _AGREES)
-#: Draws of the signs of round-off. One more changes the estimate by a few percent.
-_DRAWS = 3
 
 
 def sense(trial: Trial, fold: Event, newton: Newton) -> float:
