@@ -34,8 +34,8 @@ def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int, longer: fl
     """Return whether a multiplier may have passed 1 or -1, or as one of a pair the circle, and back.
 
     The first and the last row of ``real`` and ``imaginary`` hold the logarithms at both ends, those that are not known as NaN.
-    A real multiplier becomes one of a pair only where it meets another one of its sign. It leaves its sign only in that way,
-    unless it may be zero, as those of a ``map_`` may.
+    A real multiplier becomes one of a pair only where it meets another one of its sign, and one of both moves half of the way.
+    It leaves its sign only in that way, unless it may be zero, as those of a ``map_`` may.
 
     A logarithm is a rate times the time of a round, which becomes ``longer`` by this factor: towards a homoclinic orbit all
     logarithms grow with it, and nothing passes. So rates are compared, over the time at either end.
@@ -46,19 +46,20 @@ def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int, longer: fl
         here, there, scale = (0, last, 1 / longer) if side == 0 else (last, 0, longer)
         for i in range(n):
             x, y = real[here, i], imaginary[here, i]
-            move, partner = math.inf, math.inf
+            move, partner, half_way = math.inf, math.inf, math.inf
             for j in range(n):
                 turn = y - imaginary[there, j]
                 turn -= 2 * math.pi * math.floor(turn / (2 * math.pi) + 0.5)
                 move = min(move, math.hypot(x - scale * real[there, j], turn))
                 if j != i and abs(imaginary[here, j]) == abs(y):
-                    partner = min(partner, abs(real[here, j]))
+                    partner, half_way = min(partner, abs(real[here, j])), min(half_way, abs(x - real[here, j]) / 2)
             distance = math.hypot(x, y)
             if what == CIRCLE:
                 distance = max(abs(x), partner)
             elif what == MINUS_ONE:
-                stays = y == 0.0 and partner == math.inf and not map_
-                distance = math.inf if stays else math.hypot(x, math.pi - abs(y))
+                distance = math.hypot(x, math.pi - abs(y))
+                if y == 0.0 and not map_:
+                    distance = max(distance, half_way)
             if not (distance > _NEAR and _NEAR * move < distance):
                 return 1
     return 0

@@ -18,6 +18,7 @@ def test_a_real_multiplier_by_itself_keeps_its_sign():
     """It would have to be zero, as only those of maps can be, or to meet another one of its sign."""
     assert not near([-20], [-80], MINUS_ONE) and near([-20], [-80], MINUS_ONE, map_=1)
     assert near([-20, -3], [-80, -20], MINUS_ONE)
+    assert not near([-30, 0.7], [-30, 1.9], MINUS_ONE) and near([-30, 0.7], [-30, 1.9], MINUS_ONE, map_=1)
     assert not near([-20, -4 + math.pi * 1j], [-80, -4.5 + math.pi * 1j], MINUS_ONE)
 
 
