@@ -47,7 +47,7 @@ class Judge:
     def asks(self, inspection: Inspection) -> bool:
         """Return whether a step must be looked at closely, by what both its ends say."""
         arc = inspection.arc
-        return arc.state.singular or arc.is_moved or any(asks(inspection) for asks in self._watch)
+        return arc.is_moved or any(asks(inspection) for asks in self._watch)
 
     def doubt(self, inspection: Inspection) -> str:
         """Return why a step cannot be believed, as a clause; "" where it can.
