@@ -102,9 +102,8 @@ def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[
         if value is not None and name != here:
             continue
         x, at = branch.points[name][piece.rows], float(branch.points[name][row]) if value is None else value
-        gaps = np.where(
-            np.abs(x - at) <= levels.APART * (1 + abs(at)), 0.0, x - at
-        )  # two ends that are located there may be there
+        there = np.abs(x - at) <= levels.APART * (1 + abs(at))  # two ends that are located there may be there
+        gaps = np.where(there, 0.0, x - at)
         for i in np.flatnonzero(gaps[:-1] * gaps[1:] <= 0):
             pair = piece.rows[i], piece.rows[i + 1]
             part = 0.0 if x[i] == x[i + 1] else float((at - x[i]) / (x[i + 1] - x[i]))
