@@ -72,8 +72,11 @@ class Kernel:
     def entry(self) -> str:
         """The name of the function that its machine code holds for Python: a fingerprint of what it is made of."""
         numbers = [part for part in self.parts if isinstance(part, int | float)]
+        called = [part.entry for part in self.parts if isinstance(part, Kernel)]  # with the numbers that these read
         held = sorted(map(contents, self.files))
-        return machine_code.ENTRY + _fingerprint(self.name, self.reorder, numbers, held, _made_by(), object.__basicsize__)
+        return machine_code.ENTRY + _fingerprint(
+            self.name, self.reorder, numbers, called, held, _made_by(), object.__basicsize__
+        )
 
     @functools.cached_property
     def key(self) -> str:

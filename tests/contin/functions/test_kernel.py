@@ -109,10 +109,11 @@ def test_what_is_called_is_not_part_of_the_length():
 
 INNER = """
 from contin.functions.kernel import kernel
+from factors import FACTOR
 
 @kernel
 def inner(x: int) -> int:
-    return 2 * x
+    return FACTOR * x
 
 @kernel
 def other(x: int) -> int:
@@ -146,6 +147,7 @@ PENDING, LOADED = ["Kernel"] * 3, ["builtin_function_or_method"] * 3
 @pytest.fixture
 def run(tmp_path):
     """Return a function that runs `PROGRAM` in a new process."""
+    (tmp_path / "factors.py").write_text("FACTOR = 2")
     (tmp_path / "inner_kernels.py").write_text(INNER)
     (tmp_path / "outer_kernels.py").write_text(OUTER)
     paths = os.pathsep.join([str(tmp_path), *sys.path])
@@ -172,9 +174,12 @@ def test_kernels_from_the_cache_call_kernels(run, tmp_path):
     for name in (files[0], files[-1]):
         (tmp_path / "cache" / name).unlink()
         assert run()[0] == 51 and run() == (51, LOADED)
-    (tmp_path / "inner_kernels.py").write_text(INNER.replace("2 * x", "5 * x"))
+    (tmp_path / "inner_kernels.py").write_text(INNER.replace("3 * x", "6 * x"))
     assert run() == (81, PENDING)
     assert run() == (81, LOADED)
+    (tmp_path / "factors.py").write_text("FACTOR = 5")  # a number that only what is called reads
+    assert run() == (111, PENDING)
+    assert run() == (111, LOADED)
 
 
 def test_loaded_kernels_are_functions_of_python():
