@@ -97,10 +97,7 @@ class Continuation:
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._own = [test for test in self.state.system.events() if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
-        general = [
-            *user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema),
-            *settings.events,
-        ]  # fmt: skip
+        general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
         self._tests = [*general, *self._own]
         self._meshes = MeshPolicy(self._steps, general)
         self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
