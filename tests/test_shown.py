@@ -106,7 +106,7 @@ def of_contin():
         contin.Search([1.0]), lowlevel.further([branch[0]], "a"), orbit.phase_response(),
         branch[0].spectrum(), lowlevel.Undetermined.MODE,
         lowlevel.basis(4), contin.ProblemError("a sentence"), contin.ConvergenceError("a sentence"),
-        lowlevel.correct(lowlevel.Algebraic(cusp, []), [1.0]), contin.Reason.LIMIT, lowlevel.Colour.BLUE,
+        lowlevel.correct(lowlevel.Algebraic(cusp, []), [1.0]), contin.Reason.LIMIT, lowlevel.Colour.BLUE, lowlevel.Label.FOLD,
     ]  # fmt: skip
 
 

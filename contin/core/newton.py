@@ -262,7 +262,7 @@ def _settled(
         now = rounded_off(system, x, rows)
         if np.all(np.abs(update) <= np.maximum(least, UNITS * np.maximum(noise, now))):
             return Corrected(x, factors, count, float(np.max(np.abs(update) / (1 + np.abs(x)))))
-        noise, before = now, np.abs(update)
+        noise, before = now, sizes(update)
         subtract(x, update)
     raise _failure(relative)
 
