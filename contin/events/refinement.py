@@ -21,7 +21,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, Finding, finding_of
-from contin.levels import BESIDE, CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES
+from contin.levels import CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
 from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
@@ -259,24 +259,26 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     value = test.function(here)
     if value == 0:
         return here, 0.0
-    beside = at(BESIDE)
-    best, other = (0.0, value, here), (BESIDE, test.function(beside), beside)
-    slope, blurred = abs(other[1] - value) / BESIDE, [0.0]
+    beside = at(ROUGH)
+    best, other = (0.0, value, here), (ROUGH, test.function(beside), beside)
+    if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:
+        return here, ROUGH  # the parameter stands still all around: its value there is that of the fold
+    slope, blurred = abs(other[1] - value) / ROUGH, [0.0]
     for _ in range(MOST_UPDATES):
         best, other = sorted((best, other), key=lambda place: abs(place[1]))
-        if best[1] == 0 or (test.label == Label.FOLD and abs(other[1]) < CORRECTED):
-            return best[2], 0.0  # where a parameter stands still all around, its value there is that of the fold
+        if best[1] == 0:
+            return best[2], 0.0
         if len(blurred) > _BLURRED or best[1] == other[1]:
             break  # the function is round-off, or does not depend on the place and is not zero
         s = best[0] - best[1] * (best[0] - other[0]) / (best[1] - other[1])
         if not abs(s) <= _AWAY:
             break  # such a zero is another one, or the function is round-off
-        trial = at(s)
         if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < LAST_PLACES:
-            return trial, 0.0
+            return best[2], abs(s - best[0])
+        trial = at(s)
         other = s, test.function(trial), trial
         blurred = [*blurred, abs(other[1])] if abs(other[1]) > _NEARER * abs(best[1]) else [0.0]
-    if len(blurred) > _BLURRED and max(blurred) < slope * BESIDE:
+    if len(blurred) > _BLURRED and max(blurred) < slope * ROUGH:
         return best[2], max(blurred) / slope
     return here, _known_to(lambda s: test.function(at(s)))
 
