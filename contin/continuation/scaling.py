@@ -121,9 +121,10 @@ class _FirstPoint:
 
     def _stands_still(self, rate: float) -> bool:
         """Return whether the primary parameter stands still while states go on: by itself, and relative to all values."""
-        value, moving = abs(self.x[self.place]), (self.x != 0) & (self.linear.tangent != 0)
-        fastest = np.max(np.abs(self.linear.tangent[moving] / self.x[moving]), initial=0.0)
-        return bool(abs(rate) <= CORRECTED and abs(rate) <= CORRECTED * fastest * value)
+        x, tangent = np.abs(self.x), np.abs(self.linear.tangent)
+        value, moving = x[self.place], (x > 0) & (tangent > 0)
+        slow = abs(rate) * x[moving] <= CORRECTED * value * tangent[moving]  # no quotients: zeros may have become 1e-300
+        return bool(abs(rate) <= CORRECTED and (rate == 0 or (value > 0 and slow.any())))
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:
