@@ -274,7 +274,7 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
         if not abs(s) <= _AWAY:
             break  # such a zero is another one, or the function is round-off
         if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < LAST_PLACES:
-            return best[2], abs(s - best[0])
+            return at(s), abs(s - best[0])
         trial = at(s)
         other = s, test.function(trial), trial
         blurred = [*blurred, abs(other[1])] if abs(other[1]) > _NEARER * abs(best[1]) else [0.0]
