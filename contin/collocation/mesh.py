@@ -63,7 +63,7 @@ class MeshControl:
         checks.whole("every", self.every, 0, 1_000_000)
 
 
-#: Part of the domain within which a mesh point lies on a break.
+#: No breaks.
 _NOWHERE = np.empty(0)
 
 

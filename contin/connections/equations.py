@@ -26,7 +26,6 @@ from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
-#: Number of results at points that are kept, subspaces and eigenvalues: a step asks for those of a few iterates.
 _Result = TypeVar("_Result")
 
 

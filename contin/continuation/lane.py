@@ -255,8 +255,7 @@ class MeshLane(Lane):
         self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
         self._monodromy = system.monodromy
         width = 2 * n + len(system.free)
-        shapes = (system.intervals - 1, n, width), (width - n, width)
-        self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1]), np.empty(shapes[0][0])) for _ in range(2)]
+        self._relations = [Relations.unfilled(system.intervals - 1, n, width) for _ in range(2)]
         self._quotient, self._watched = _quotient(width), settings.branch_points
         self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
         self._left: tuple[Array, _Begun] | None = None

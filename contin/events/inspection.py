@@ -33,7 +33,7 @@ from contin.levels import APART, BESIDE, CORRECTED, DEPENDENT, DOUBLED, ROUGH
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
-#: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
+#: What a note says of a step that no shorter one explains, and what may help.
 _STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
@@ -42,7 +42,7 @@ FEWEST = 3
 _SAME_WAY = 0.5
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 REACH = 2
-#: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
+#: A fold within this part of the step, and `BESIDE`, of a point where branches cross is that point ...
 _SAME_SHARE = 2e-3
 #: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
 _EXPLAINED = 2.0

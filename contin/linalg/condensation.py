@@ -25,7 +25,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.functions.kernel_parts import Matrix, Stack
 from contin.linalg.elimination import Eliminated, factorize
-from contin.linalg.ends import Ends
+from contin.linalg.ends import Relations, relations_of
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.segments import Share, run, share
 from contin.linalg.substitution import solve, solve_transposed, work_size
@@ -105,12 +105,12 @@ class Factorization:
         self.sign = math.nan
 
     @functools.cached_property
-    def ends(self) -> Ends | None:
+    def ends(self) -> Relations | None:
         """What is left between both ends of the mesh; None for a single interval, and for matrices of several segments."""
         factors, _, first, last, carried, _ = self.room
         if self._whole.last > 1 or len(factors.local) == 1:
             return None
-        return Ends(self._layout.offsets, factors, carried[0], first, last)
+        return relations_of(self._layout.offsets, factors, carried[0], first, last)
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""

@@ -28,18 +28,33 @@ from contin.linalg.singular import orthonormalize_row
 
 
 class Relations(NamedTuple):
-    """What is filled in of `Ends`."""
+    """What condensation has left of a matrix.
+
+    Attributes
+    ----------
+    relations : ndarray, shape (N - 1, n, 2 n + k)
+        Orthonormal rows that relate the first mesh point to each of the others, from the second on.
+    others : ndarray, shape (n_bc + r, 2 n + k)
+        Boundary conditions and border.
+    sides : ndarray, shape (N - 1,)
+        On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
+    """
 
     relations: Stack
     others: Matrix
     sides: Vector
+
+    @classmethod
+    def unfilled(cls, points: int, n: int, width: int) -> Relations:
+        """Return room for N - 1 ``points`` and 2 n + k columns: as many as there are rows."""
+        return cls(np.empty((points, n, width)), np.empty((width - n, width)), np.empty(points))
 
 
 @kernel
 def relate_ends(
     offsets: IndexVector, factors: Eliminated, carried: Matrix, first: Matrix, last: Matrix, found: Relations
 ) -> None:
-    """Fill in what `Ends` describes; ``offsets`` are those of the groups of states in a `Layout`."""
+    """Fill in relations, by the arguments of `relations_of`."""
     relations, others, sides = found
     points, n, width = relations.shape
     rows = factors.local.shape[1]
@@ -131,19 +146,24 @@ def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Mat
 
 
 @helper
+def _pivot(matrix, column, size):
+    """Exchange rows so that the largest entry of a column stands on the diagonal; return the row that it came from."""
+    place = column
+    for i in range(column + 1, size):
+        if abs(matrix[i, column]) > abs(matrix[place, column]):
+            place = i
+    if place != column:
+        for b in range(size):
+            matrix[column, b], matrix[place, b] = matrix[place, b], matrix[column, b]
+    return place
+
+
+@helper
 def _sign(matrix, size):
     """Return the sign of the determinant of the first rows and columns of a matrix, which are overwritten."""
     sign = 1.0
     for column in range(size):
-        place = column
-        for i in range(column + 1, size):
-            if abs(matrix[i, column]) > abs(matrix[place, column]):
-                place = i
-        if place != column:
-            sign = -sign
-            for b in range(size):
-                matrix[column, b], matrix[place, b] = matrix[place, b], matrix[column, b]
-        if matrix[column, column] < 0:
+        if (_pivot(matrix, column, size) != column) != (matrix[column, column] < 0):
             sign = -sign
         for i in range(column + 1, size):
             factor = matrix[i, column] / matrix[column, column] if matrix[column, column] != 0.0 else 0.0
@@ -157,13 +177,9 @@ def _solve(matrix, right):
     """Solve for the columns of the right-hand side, in place, by elimination with partial pivoting; NaN if it is singular."""
     size = matrix.shape[0]
     for column in range(size):
-        place = column
-        for i in range(column + 1, size):
-            if abs(matrix[i, column]) > abs(matrix[place, column]):
-                place = i
+        place = _pivot(matrix, column, size)
         if place != column:
             for b in range(size):
-                matrix[column, b], matrix[place, b] = matrix[place, b], matrix[column, b]
                 right[column, b], right[place, b] = right[place, b], right[column, b]
         pivot = matrix[column, column] if matrix[column, column] != 0.0 else math.nan
         for i in range(column + 1, size):
@@ -219,8 +235,8 @@ def is_near_one(matrix: Matrix, apart: float, factor: float, work: Matrix) -> in
     return 1
 
 
-class Ends:
-    """What condensation has left of a matrix.
+def relations_of(offsets: Indices, factors: Eliminated, carried: Array, first: Array, last: Array) -> Relations:
+    """Return what condensation has left of a matrix.
 
     Parameters
     ----------
@@ -231,26 +247,13 @@ class Ends:
         The rows that relate both ends, and the border.
     first, last : ndarray, shape (n_bc, n) and (n_bc, n + k)
         The boundary conditions.
-
-    Attributes
-    ----------
-    relations : ndarray, shape (N - 1, n, 2 n + k)
-        Orthonormal rows that relate the first mesh point to each of the others, from the second on.
-    others : ndarray, shape (n_bc + r, 2 n + k)
-        Boundary conditions and border.
-    sides : ndarray, shape (N - 1,)
-        On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
     """
-
-    def __init__(self, offsets: Indices, factors: Eliminated, carried: Array, first: Array, last: Array) -> None:
-        (conditions, n), (height, width), points = first.shape, carried.shape, len(factors.chain)
-        found = Relations(np.empty((points, n, width)), np.empty((conditions + height - n, width)), np.empty(points))
-        relate_ends(offsets, factors, carried, first, last, found)
-        self.found = found
-        self.relations, self.others, self.sides = found
+    found = Relations.unfilled(len(factors.chain), first.shape[1], carried.shape[1])
+    relate_ends(offsets, factors, carried, first, last, found)
+    return found
 
 
-def compared(before: Ends, after: Ends) -> tuple[Array, float]:
+def compared(before: Relations, after: Relations) -> tuple[Array, float]:
     """Return the quotient after^-1 before of the condensed matrices at two points, and the largest turn.
 
     The rows that relate the ends at the second point are the projections of those at the first one to their span there, so
@@ -259,5 +262,5 @@ def compared(before: Ends, after: Ends) -> tuple[Array, float]:
     becomes singular inside.
     """
     quotient, work = np.empty((2, *([before.relations.shape[2]] * 2)))
-    turn = divide_ends(before.found, after.found, quotient, work)
+    turn = divide_ends(before, after, quotient, work)
     return quotient, turn

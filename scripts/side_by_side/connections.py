@@ -6,6 +6,7 @@ import functools
 import math
 
 import numpy as np
+from bank import stw as stw_front
 from scipy.integrate import solve_ivp
 
 import contin
@@ -38,18 +39,7 @@ def nag(way: int):
 
 def stw():
     """A sharp front, on the way from one equation to another."""
-
-    def field(u, p):
-        fa, fb, fc = 2 * u.u + p.p * u.u**2, 2 * (1 - p.p) + p.p * u.u, u.u - u.u**2
-        return fa * u.v, -p.c * u.v - fb * u.v**2 - fc
-
-    def guess(t):
-        e = math.exp(40 * (t - 0.5))
-        return 1 / (1 + e), -0.5 * e / (1 + e)
-
-    problem = ConnectionProblem(field, ["u", "v"], {"p": 0.0, "c": 1.0}, unstable=1, stable=1)
-    start = contin.solve(problem, guess, {"time": 40, "from_u": 1.0, "from_v": 0.0, "to_u": 0.0, "to_v": -0.5}, free=["c"])
-    return [contin.trace(start, free=["p", "c"], limits={"p": (0, 1.1446)}, zeros={"p": [1.0]})]
+    return [contin.trace(stw_front.front(), free=["p", "c"], limits={"p": (0, 1.1446)}, zeros={"p": [1.0]})]
 
 
 # --- san: Sandstede's equations ---------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from bank import stw
 
 from contin import AlgebraicProblem, ConnectionProblem, CycleProblem, ProblemError, homoclinic, load, save, solve, trace
 
@@ -220,17 +221,6 @@ def test_an_orbit_that_was_used_takes_another_reference():
 
 def test_a_front_that_neither_end_feels_is_followed_in_few_steps():
     """AUTO's demo stw: the condensed matrix alone saw pairs of branch points, and steps were halved to the end of the run."""
-
-    def field(u, p):
-        fa, fb, fc = 2 * u.u + p.p * u.u**2, 2 * (1 - p.p) + p.p * u.u, u.u - u.u**2
-        return fa * u.v, -p.c * u.v - fb * u.v**2 - fc
-
-    def guess(t):
-        e = math.exp(40 * (t - 0.5))
-        return 1 / (1 + e), -0.5 * e / (1 + e)
-
-    problem = ConnectionProblem(field, ["u", "v"], {"p": 0.0, "c": 1.0}, unstable=1, stable=1)
-    start = solve(problem, guess, {"time": 40, "from_u": 1.0, "from_v": 0.0, "to_u": 0.0, "to_v": -0.5}, free=["c"])
-    branch = trace(start, free=["p", "c"], limits={"p": (0, 1.1)}, zeros={"p": [1.0]}, max_points=60, errors=False)
+    branch = trace(stw.front(), free=["p", "c"], limits={"p": (0, 1.1)}, zeros={"p": [1.0]}, max_points=60, errors=False)
     assert branch.stop.reason == "limit" and not branch.labelled("BP")
     assert abs(branch.labelled("UZ")[0]["c"]) < 1e-9  # the front stands still
