@@ -237,21 +237,27 @@ def previews():
     return {law: preview(parse(FIG12, "fig12", [f"law={law}"])) for law in ("ribbon", "isotropic rod")}
 
 
+@pytest.fixture(scope="module")
+def pictures(previews):
+    """Fig. 12 as it is drawn, by law. The tests only read from it."""
+    return {law: diagram_figure(graph, law, 0.3) for law, graph in previews.items()}
+
+
 @pytest.mark.parametrize("law", ["ribbon", "isotropic rod"])
-def test_every_line_of_fig12_has_its_name(law, previews):
+def test_every_line_of_fig12_has_its_name(law, previews, pictures):
     """In one panel at least; a name stands on no other line, mark or name."""
-    made = diagram_figure(previews[law], law, 0.3)
+    made = pictures[law]
     found = [line for line in lines(previews[law], law, 0.3) if np.any(np.abs(line.kappa_n - 3) < 11)]
     names = {text.get_text() for axes in every_axes(made) for text in axes.texts}
     assert {line.name for line in found} <= names
     for axes in every_axes(made):
-        drawn = [line for line in axes.lines if line.get_zorder() == 2]  # branches, no circles
+        drawn = [pixels(axes, line) for line in axes.lines if line.get_zorder() == 2]  # branches, no circles
         boxes = [text.get_window_extent() for text in axes.texts]
         assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
         for box in boxes:
             centre = np.mean(box.get_points(), axis=0)
-            crossing = sum(inside(axes, line, box) for line in drawn)
-            own = min(distance(axes, line, centre) for line in drawn)
+            crossing = sum(inside(line, box) for line in drawn)
+            own = min(np.linalg.norm(line - centre, axis=1).min() for line in drawn)
             assert crossing == (own < 1)  # its own line, or none if a thin line leads to it
 
 
@@ -263,21 +269,19 @@ def pixels(axes, line):
     """Pixels of a drawn line, two apart at most."""
     found = axes.transData.transform(line.get_xydata())
     found = found[np.abs(found).max(axis=1) < 1e4]
-    return np.concatenate([np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / 2)) for a, b in itertools.pairwise(found)])
+    way = np.diff(found, axis=0)
+    count = 1 + (np.hypot(*way.T) / 2).astype(int)
+    part = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / np.repeat(count, count)
+    return np.vstack([np.repeat(found[:-1], count, axis=0) + part[:, None] * np.repeat(way, count, axis=0), found[-1:]])
 
 
-def inside(axes, line, box):
+def inside(line, box):
     low, high = box.get_points()
-    found = pixels(axes, line)
-    return bool(((found > low + 1) & (found < high - 1)).all(axis=1).any())
+    return bool(((line > low + 1) & (line < high - 1)).all(axis=1).any())
 
 
-def distance(axes, line, place):
-    return np.linalg.norm(pixels(axes, line) - place, axis=1).min()
-
-
-def test_the_inset_shows_the_five_bifurcations_that_are_one_blob(previews):
-    (inset,) = diagram_figure(previews["ribbon"], "ribbon", 0.3).axes[0].child_axes
+def test_the_inset_shows_the_five_bifurcations_that_are_one_blob(pictures):
+    (inset,) = pictures["ribbon"].axes[0].child_axes
     low, high = inset.get_xlim()
     places = [exact.bifurcation(1, n, 0.3) for n in (3, 4, 5, 6, 7)]
     assert low < min(places) and max(places) < high < 3.5

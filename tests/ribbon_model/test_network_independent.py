@@ -1,30 +1,20 @@
-"""The states of all shipped networks of rods by shooting: Kirchhoff's equations with rotation matrices, and balances by hand.
+"""States of networks of rods by shooting: Kirchhoff's equations with rotation matrices, and balances by hand.
 
 Nothing of contin is used: members are integrated with SciPy's DOP853, all ends meet by Newton's method with differences. The
-start is the state of the scene; where Newton's method ends, places, reactions and energy must be those of the scene.
+start is a state that was found otherwise, and must be where Newton's method ends; so are those of all shipped scenes
+(tests/branches/test_network.py).
 """
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from branches.read import read_branch
-from branches.run.display import Display
-from branches.run.runner import run_scene
-from branches.scene.parse import load
 from ribbon_model.ends import CLAMPED, FREE, HINGED, prescribed
 from ribbon_model.network import BALL, FINISH, HINGE, START, Network
 
-CONFIGS = Path(__file__).parents[2] / "configs"
-SCENES = sorted(path.stem for path in CONFIGS.glob("network_*.yaml") if "law: rod" in path.read_text("utf-8"))
-#: Those of many strips take ten seconds and more.
-LONG = ("network_arches", "network_bigon_ring", "network_hexagon", "network_hexagram")
 #: Steps of differences, and where Newton's method ends.
 _STEP, _ENOUGH = 1e-6, 1e-11
 
@@ -217,53 +207,3 @@ class Shooting:
         w, x, y, z = state[:4]
         rows = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]) / 2
         return _frame(state[:4]) @ (rows @ state[7:11])
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("networks")
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name in LONG else name for name in SCENES])
-def test_shooting_finds_the_same_states(name, folder):
-    scene, path = load(CONFIGS / f"{name}.yaml"), folder / f"{name}.h5"
-    run_scene(scene, path, Display(silent=True))
-    branch = read_branch(path)
-    for stage in np.unique(branch.stage_of):
-        row = int([point for point in branch.kept() if branch.stage_of[point] == stage][-1])
-        network, (_, states) = scene.strip(int(stage)), branch.states_at(row)
-        numbers = branch._numbers(row)
-        shooting = Shooting(network, numbers)
-        both, moved = shooting.solved([states[0, list(piece.at)] for piece in network.problem.pieces])
-        size = 1 + max(np.abs(states[:, list(piece.at[11:14])]).max() for piece in network.problem.pieces)
-        assert moved < 1e-8 * size, f"{name}, stage {stage}"
-        assert sum(energy for *_, energy in both) == pytest.approx(float(branch.points["energy"][row]), abs=1e-9 * size)
-        for joint_name, joint in network.joints.items():
-            each = joint.members[0]
-            end = both[shooting.order.index(each.member)][0 if each.end == START else 1]
-            if len(joint.members) == 1 and joint_name in network.held and not network.loads:
-                pulls = [float(branch.points[f"F_{joint_name}_{x}"][row]) for x in "xyz"]
-                assert end.force == pytest.approx(pulls, abs=1e-8 * size)
-            place = end.place + end.frame @ each.arm
-            assert place == pytest.approx([float(branch.points[f"{joint_name}_{x}"][row]) for x in "xyz"], abs=1e-9 * size)
-
-
-def test_the_determinant_vanishes_where_a_bigon_buckles(folder):
-    """3.682897251: of the flat bigon of 60 degrees, C = .75; central differences leave 1e-8."""
-    scene, path = load(CONFIGS / "network_bigon.yaml"), folder / "flat.h5"
-    run_scene(scene.up_to(1), path, Display(silent=True))
-    branch = read_branch(path)
-    network, (_, states) = scene.strip(), branch.states_at(0)
-    buckling = float(branch.events["kappa_n"][branch.events["label"] == b"BP"][0])
-
-    def determinant(kappa_n):
-        shooting, starts = Shooting(network, {**branch._numbers(0), "kappa_n": kappa_n}), []
-        for piece in network.problem.pieces:
-            state = states[0, list(piece.at)].copy()
-            state[7:11] *= 1 - kappa_n / (math.pi / 3)  # M = B1 (2 alpha - kappa_n)
-            starts.append(state)
-        bases, x, both = shooting.begun(starts)
-        assert np.abs(shooting.missed(both)).max() < 1e-10
-        return np.linalg.det(shooting.slopes(bases, x, 1e-5))
-
-    assert brentq(determinant, buckling - 0.05, buckling + 0.05) == pytest.approx(buckling, abs=3e-8)

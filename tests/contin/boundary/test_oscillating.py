@@ -1,5 +1,6 @@
 """Time-periodic states of fields, beside a closed form and an integration in time."""
 
+import functools
 import math
 
 import numpy as np
@@ -33,6 +34,7 @@ def hopf():
     return point
 
 
+@functools.cache
 def integrated(b, count=12):
     """Return the period and the mean square of x - its mean, by Chebyshev nodes and an integration in time."""
     s = (1 - np.cos(np.pi * np.arange(count + 1) / count)) / 2

@@ -105,19 +105,24 @@ def test_folds_are_passed_by_bordered_matrices():
 
 
 def test_eigenvalues_are_found_with_it():
-    """Hopf points of a chain of oscillators (x' = mu x - y ..., diffusion): the first at mu = 0."""
-    n = LINE // 2
-    second = sp.csr_array(sp.diags_array([1.0, -2.0, 1.0], offsets=[-1, 0, 1], shape=(n, n)).tolil())
-    second[0, 0] = second[-1, -1] = -1.0  # ends without flux: a mode without diffusion
+    """Hopf points of a plate of oscillators (x' = mu x - y ..., diffusion): the first at mu = 0, others from 0.08 on."""
 
-    def chain(u, p, out):
+    def second(count):
+        matrix = sp.diags_array([1.0, -2.0, 1.0], offsets=[-1, 0, 1], shape=(count, count)).tolil()
+        matrix[0, 0] = matrix[-1, -1] = -1.0  # ends without flux: a mode without diffusion
+        return matrix
+
+    n, sides = 110, (10, 11)
+    laplacian = sp.csr_array(sp.kronsum(second(sides[0]), second(sides[1])))
+
+    def plate(u, p, out):
         x, y = u[:n], u[n:]
-        out[:n] = second @ x + p[0] * x - y - x * (x**2 + y**2)
-        out[n:] = second @ y + x + p[0] * y - y * (x**2 + y**2)
+        out[:n] = laplacian @ x + p[0] * x - y - x * (x**2 + y**2)
+        out[n:] = laplacian @ y + x + p[0] * y - y * (x**2 + y**2)
 
     before = Plain.made
-    problem = AlgebraicProblem(chain, 2 * n, {"mu": -0.1}, count=2 * n, solver=Plain)
-    branch = trace(solve(problem, np.zeros(2 * n)), free=["mu"], limits={"mu": (-0.1, 5e-4)}, branch_points=False)
+    problem = AlgebraicProblem(plate, 2 * n, {"mu": -0.1}, count=2 * n, solver=Plain)
+    branch = trace(solve(problem, np.zeros(2 * n)), free=["mu"], limits={"mu": (-0.1, 0.05)}, branch_points=False)
     (hopf,) = branch.labelled("HB")
     assert abs(hopf["mu"]) < 1e-9 and hopf.details["frequency"] == pytest.approx(1.0, rel=1e-9)
     assert Plain.made > before
