@@ -17,7 +17,8 @@ from contin.arrays import Array, Indices
 from contin.boundary.unknowns import OnMesh
 from contin.collocation.assembly import Bordering, assemble, collocate
 from contin.collocation.defect import Defect
-from contin.collocation.workspace import Workspace, workspace
+from contin.collocation.projection import Projections, projections
+from contin.collocation.workspace import Values, Workspace, workspace
 from contin.functions.batch import Batch, Columns
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
 from contin.linalg.condensation import Factorization
@@ -319,8 +320,25 @@ class BoundaryEquations(OnMesh):
 
     @property
     def linear_conditions(self) -> tuple[Array, Array] | None:
-        """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where these are not linear."""
+        """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where a kernel does not know them.
+
+        Zeros stand for those of `projections`.
+        """
         return np.empty((0, self.size)), np.empty(0)
+
+    @property
+    def projections(self) -> Projections:
+        """The room in which a kernel evaluates projection conditions: here none."""
+        none, field = np.zeros((self._n, len(self.parameters))), self._field.load()
+        return projections(field, field, (0, 0), (none, none), self._free)
+
+    def fill_conditions(self, values: Values) -> int:
+        """Fill in what a kernel must know of the conditions beyond those of the problem; return how many there are."""
+        known = self.linear_conditions
+        assert known is not None
+        own = len(known[1])
+        values.rows[:own], values.targets[:own] = known
+        return own
 
     @property
     def workspace(self) -> Workspace | None:

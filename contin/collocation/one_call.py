@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from contin.collocation.assembly import Bordering, assemble, at_points, collocate
+from contin.collocation.projection import fill_projections
 from contin.collocation.workspace import Workspace, put_free
 from contin.functions.interpreter import Points, run_loaded
 from contin.functions.kernel import kernel
@@ -29,8 +30,8 @@ EXACT = 1e-15
 #: An update with a new Jacobian below this leaves that one right at the solution, but for so much: tangents are as exact.
 RIGHT_THERE = 1e-13
 
-#: What a call comes to: converged; updates no longer shrink; no convergence; the equations are not finite at x. Inside it,
-#: converged with factors that are right at x.
+#: What a call comes to: converged; updates no longer shrink, or Python must evaluate conditions; no convergence; the equations
+#: are not finite at x. Inside it, converged with factors that are right at x.
 CONVERGED, STAGNATES, FAILED, NOT_FINITE, RIGHT = range(5)
 #: Places in the report: iterations, the error left, the sign of the determinant; then the updates' sizes.
 ITERATIONS, ERROR, SIGN, UPDATES = range(4)
@@ -51,7 +52,7 @@ class Control(NamedTuple):
 
 @helper
 def _evaluate(codes, mesh, room, x, slopes):
-    """Fill values at x and, with ``slopes``, derivatives."""
+    """Fill values at x and, with ``slopes``, derivatives; return whether Python need not do it."""
     n = room.points.shape[1]
     put_free(mesh, room, x)
     at_points(mesh.tables.value, x, room.points)
@@ -65,6 +66,8 @@ def _evaluate(codes, mesh, room, x, slopes):
     else:
         run_loaded(codes.field, room.p, inside, room.field, room.nothing)
         run_loaded(codes.ends, room.p, ends, room.boundary, room.nothing)
+    given = room.projections, room.p, x, mesh.states, room.rows, 1 if slopes else 0
+    return room.projections.total == 0 or fill_projections(*given) == 1
 
 
 @helper
@@ -75,7 +78,10 @@ def _fill_residual(mesh, room, x):
         room.points.shape[1], mesh.tables.slope, mesh.tables.weights, mesh.h, x, room.field, room.boundary,
         right[: mesh.conditions],
     )  # fmt: skip
-    for q in range(room.rows.shape[0]):
+    projections = room.projections
+    for q in range(projections.total):
+        right[mesh.conditions + q] = projections.values[q]
+    for q in range(projections.total, room.rows.shape[0]):
         total = 0.0
         for i in range(x.size):
             total += room.rows[q, i] * x[i]
@@ -103,7 +109,8 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
     """Chord steps with the factors at hand, for an x that is close."""
     before = 1.0
     for number in range(CHORDS):
-        _evaluate(codes, mesh, room, x, False)
+        if not _evaluate(codes, mesh, room, x, False):
+            return STAGNATES
         _fill_residual(mesh, room, x)
         _solve(mesh, room, matrix)
         size = subtract(x, room.update[0])
@@ -126,7 +133,8 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     before, size, moved, fresh, tolerance = math.inf, math.inf, 1.0, True, control.tolerance
     for number in range(control.most):
-        _evaluate(codes, mesh, room, x, fresh)
+        if not _evaluate(codes, mesh, room, x, fresh):
+            return STAGNATES
         _fill_residual(mesh, room, x)
         if fresh:
             report[SIGN] = _factor(mesh, room, matrix)
@@ -152,7 +160,8 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
 def _linearize(work, matrix, x, weights, tangent, report, known):
     """Factor the matrix right at x, unless the factors at hand are ``known`` to be those, and fill the unit tangent."""
     codes, mesh, room = work
-    _evaluate(codes, mesh, room, x, not known)
+    if not _evaluate(codes, mesh, room, x, not known):
+        return STAGNATES
     _fill_residual(mesh, room, x)
     for i in range(room.right.shape[1] - 1):
         if not abs(room.right[0, i]) < math.inf:

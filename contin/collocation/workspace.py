@@ -8,6 +8,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.collocation.assembly import Tables
+from contin.collocation.projection import Projections
 from contin.functions.interpreter import Loaded
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.layout import Layout
@@ -40,8 +41,8 @@ class Values(NamedTuple):
     """What is computed at one x: parameters p, states at Gauss points and at both ends, values and derivatives of functions.
 
     ``at`` (size,) is where derivatives were taken last. ``rows`` (r, size) are linear conditions with the values ``targets``
-    (r,), the last one that of a step. ``none``, ``nothing`` and ``zero`` are absent second states, absent derivatives, and
-    the t of boundary conditions.
+    (r,), the last one that of a step; the first ones are derivatives where there are ``projections``. ``none``, ``nothing`` and
+    ``zero`` are absent second states, absent derivatives, and the t of boundary conditions.
     """
 
     p: Vector
@@ -61,6 +62,7 @@ class Values(NamedTuple):
     none: Matrix
     nothing: Stack
     zero: Vector
+    projections: Projections
 
 
 class Workspace(NamedTuple):
@@ -94,6 +96,6 @@ def workspace(system: Any, rows: int) -> Workspace:
         np.zeros((points, field.count, of_field.width)), empty((1, ends.count)), np.zeros((1, ends.count, of_ends.width)),
         empty((rows, system.size)), empty(rows), empty((0, system._conditions + rows - 1)), empty((1, system.size)),
         empty((1, system.size)),
-        empty((0, n)), empty((0, 0, 0)), np.zeros(1),
+        empty((0, n)), empty((0, 0, 0)), np.zeros(1), system.projections,
     )  # fmt: skip
     return Workspace(codes, mesh, values)

@@ -12,6 +12,8 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Indices
 from contin.boundary.conditions import Conditioned
 from contin.collocation.mesh import MeshControl
+from contin.collocation.projection import Projections, projections
+from contin.collocation.workspace import Values
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
@@ -65,8 +67,6 @@ class ConnectionEquations(Conditioned):
     """
 
     problem: Any
-
-    plain = False
 
     def __init__(
         self, problem: Statement, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
@@ -336,6 +336,30 @@ class ConnectionEquations(Conditioned):
         found: Array = by_parameters * self.scales.parameters[self._indices(names)]
         return found
 
+    # --- in one call of a kernel -----------------------------------------------------------------------------------
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """The row of the phase condition, and its value, behind zeros for the projections; None for orbits to saddle-nodes."""
+        if self.problem.saddle_node:
+            return None
+        rows, targets = np.zeros((self._further, self.size)), np.zeros(self._further)
+        rows[-1], targets[-1] = self._phase, self._target
+        return rows, targets
+
+    @property
+    def projections(self) -> Projections:
+        """The room in which a kernel evaluates them."""
+        field, every = self._batch("vector field", ("states",)), np.diag(self.scales.parameters)
+        columns, places = field.columns([]), [(place / self.scales.states).T for place in self._places(every)]
+        return projections(field.load(columns), field.load(columns, 1), self.problem.conditions, places, self._free)
+
+    def fill_conditions(self, values: Values) -> int:
+        """Fill in also the spaces near which those of the projections are."""
+        for end, basis, complement in zip(values.projections[1:3], self._bases, self._complements):
+            end.frame[:] = np.vstack([basis, complement.T])
+        return super().fill_conditions(values)
+
     # --- for special points of homoclinic orbits -----------------------------------------------------------------
 
     def saddle_jacobian(self, x: Array) -> Array:
@@ -349,7 +373,8 @@ class ConnectionEquations(Conditioned):
     def left_null_vector(self, x: Array, factors: Factors | None = None) -> Array:
         """Return w with w F_z = 0, of unit length, z all unknowns but the user's parameters, with the sign of the reference.
 
-        ``factors`` are those of [F_x; row] at x, with any row, where they are at hand.
+        ``factors`` are those of [F_x; row] at x, with any row, where they are at hand. For the reference those near it do: its
+        vector gives the sign.
         """
         return self._once("left", x, lambda: self._left_null_vector(x, factors))
 
@@ -363,7 +388,7 @@ class ConnectionEquations(Conditioned):
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
         (*first, one), (*last, other) = factors.solve_transposed(units)
         w: Array = other * np.array(first) - one * np.array(last)
-        near = random.standard_normal(w.size) if x is self.reference else self.left_null_vector(self.reference)
+        near = random.standard_normal(w.size) if x is self.reference else self.left_null_vector(self.reference, factors)
         return w * (math.copysign(1.0, w @ near) / np.linalg.norm(w))
 
     def slow_motion(self, x: Array) -> tuple[Array, float]:

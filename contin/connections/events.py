@@ -257,7 +257,7 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
     def component(trial: Trial) -> float:
         system, x = _system(trial), trial.x
         if not known:
-            there = system.left_null_vector(system.reference)
+            there = system.left_null_vector(system.reference, trial.factors)
             if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > CORRECTED:
                 return float("nan")
         adjoint = system.adjoint_at_ends(x, system.left_null_vector(x, trial.factors))[side]

@@ -73,6 +73,8 @@ FEWEST, MOST = 8, 128
 Handed = tuple[float, Trial, Trial]
 #: Where steps on a mesh begin: factors, and their place in the lane.
 _Begun = tuple[Factorization, int]
+#: How many steps were made, and the index at their ends, if any.
+_Made = tuple[int, list[int | None] | None]
 #: Where the error of the mesh is above its tolerance already, as finer meshes do not lower it, steps whose errors grow by less
 #: than this factor want none. Ten times larger, errors of the mesh would grow unseen up to where the mesh is adapted next.
 _NO_WORSE = 2.0
@@ -134,6 +136,7 @@ class Lane(ABC):
         self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
         self._handed: Handed | None = None
         self._others, self._index = others, system.index
+        self._wants = bool(others) or system.index is not None or settings.trivial is not None
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         newton, (angle, accuracy) = settings.newton, aims(settings, system)
         self._frame = Frame(system.weights, system.state_size, system.free_scales)
@@ -166,8 +169,8 @@ class Lane(ABC):
         """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
 
     @abstractmethod
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
-        """Make plain steps from row 1 of a path, the state's point ``here``; return how many."""
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+        """Make plain steps from row 1 of a path, the state's point ``here``."""
 
     def steps(self, state: State, most: int, here: Trial) -> Block:
         """Make plain steps from a state, no more than ``most``; ``here`` is its point."""
@@ -181,29 +184,23 @@ class Lane(ABC):
         )  # fmt: skip
         self._handed = None
         made = self._make(path, state.accepted, int(bent), here)
-        passed, indices = self._passed(path, made)
-        return Block(self.system, state, path, passed, indices, self._handed if passed == made else None)
+        return Block(self.system, state, path, made, self._handed)
 
-    def _passed(self, path: Path, made: int) -> tuple[int, list[int | None] | None]:
-        """Return how many of the steps pass nothing that the kernel does not know, and the index at their ends, if any."""
-        wanted = self._others or self._index is not None or self.settings.trivial is not None
-        if not (wanted or path.numbers[2 : made + 2, CLOSES].any()):
-            return made, None
-        signs = path.numbers[1:, SIGN_OF].tolist()
-        rows = zip(path.x[1 : made + 2], path.tangents[1:], signs)
-        trials = [Trial(self.system, x, Linearization(tangent, sign)) for x, tangent, sign in rows]
-        steps = zip(itertools.pairwise(trials), path.numbers[2:, (STEP, CLOSES)].tolist())
-        passed = next((number for number, (ends, told) in enumerate(steps) if self._asks(*ends, *told)), made)
-        if self._index is None:
-            return passed, None
-        return passed, [trial.system.stability(SpecialPoint(0.0, "", "", trial)).index for trial in trials[1 : passed + 1]]
+    def _trial(self, path: Path, number: int, factors: Factorization | None = None) -> Trial:
+        """Return the point of a row of a path, with factors right there if these are at hand."""
+        return Trial(self.system, path.x[number], Linearization(path.tangents[number], path.numbers[number, SIGN_OF], factors))
 
-    def _asks(self, before: Trial, trial: Trial, step: float, closes: float) -> bool:
+    def _asks(self, before: Trial, trial: Trial, told: Array) -> bool:
         """Return whether a step asks for a closer look by what the kernel does not know, be it that this is not found."""
         try:
-            return bool(closes and returned(self._start, before, trial, step)) or self._passes(before, trial)
+            closes = told[CLOSES] and returned(self._start, before, trial, told[STEP])
+            return bool(closes) or self._passes(before, trial)
         except ConvergenceError:
             return True
+
+    def _index_at(self, trial: Trial) -> int | None:
+        """Return the index at the end of a step, if there is one."""
+        return None if self._index is None else self.system.stability(SpecialPoint(0.0, "", "", trial)).index
 
     def _passes(self, before: Trial, trial: Trial) -> bool:
         """Return whether a step passes a zero of other test functions, a change of the index, or the trivial branch."""
@@ -232,8 +229,15 @@ class SmallLane(Lane):
         circles = np.append(system.circles, np.zeros(system.size - system.state_size))
         return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
 
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
-        return int(plain_steps(self._rooms, path, accepted, bent))
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+        made, indices = int(plain_steps(self._rooms, path, accepted, bent)), list[int | None]()
+        if not (self._wants or path.numbers[2 : made + 2, CLOSES].any()):
+            return made, None
+        for before, end in itertools.pairwise(self._trial(path, number) for number in range(1, made + 2)):
+            if self._asks(before, end, path.numbers[len(indices) + 2]):
+                break
+            indices.append(self._index_at(end))
+        return len(indices), indices
 
 
 class MeshLane(Lane):
@@ -277,10 +281,10 @@ class MeshLane(Lane):
         home, x, _ = self._start
         return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
-        values, begun = self._work.values, self._begun(path, here)
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+        values, begun, indices = self._work.values, self._begun(path, here), list[int | None]()
         if begun is None:
-            return 0
+            return 0, None
         before, now = begun
         time = 1.0 if self._monodromy is None else self.system.unit_time(path.x[1])
         error = path.numbers[1, MESH_ERROR]
@@ -300,13 +304,19 @@ class MeshLane(Lane):
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
                 path.numbers[number, MESH_ERROR] = error
                 asks = not error <= poor
+            if not asks and (self._wants or path.numbers[number, CLOSES]):
+                begin = here if self._wants else self._trial(path, number - 1, before)
+                here = self._trial(path, number, after)
+                asks = self._asks(begin, here, path.numbers[number])
             if asks:
                 if step:
                     self._hand_over(path, number, abs(step), (before, after))
-                return number - 2
+                return number - 2, indices or None
+            if self._wants:
+                indices.append(self._index_at(here))
             before = after
         self._left = path.x[-1], (before, now)
-        return len(path.x) - 2
+        return len(path.x) - 2, indices or None
 
     def _begun(self, path: Path, here: Trial) -> _Begun | None:
         """Prepare steps from row 1 of a path, the point ``here``; return what is known there, None where that is not found.
@@ -315,8 +325,7 @@ class MeshLane(Lane):
         """
         _, factored, newton, report, amplitude, frame, *_ = self._rooms[0]
         values, (left, self._left) = self._work.values, (self._left, None)
-        conditions, targets = self.system.linear_conditions
-        values.rows[: len(targets)], values.targets[: len(targets)] = conditions, targets
+        self.system.fill_conditions(values)
         values.rows[-1] = frame.weights * path.tangents[1]
         if amplitude.size:
             amplitude[:] = self.system.amplitude_row
@@ -393,11 +402,9 @@ class Block:
         The step behind them, where a kernel has made it and it asks for a closer look: its length, its beginning and its end.
     """
 
-    def __init__(
-        self, system: Any, base: State, path: Path, made: int, indices: list[int | None] | None, handed: Handed | None
-    ) -> None:
-        self._system, self._base, self._path, self.made, self._indices = system, base, path, made, indices
-        self.handed = handed
+    def __init__(self, system: Any, base: State, path: Path, made: _Made, handed: Handed | None) -> None:
+        self._system, self._base, self._path, self.handed = system, base, path, handed
+        self.made, self._indices = made
 
     def state(self, row: int) -> State:
         """Return the state behind a step, by its row of the path."""

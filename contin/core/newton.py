@@ -174,9 +174,7 @@ def _in_one_call(
     values = work.values
     if (row is None) != (system.size == system.equations):
         return None
-    conditions, targets = system.linear_conditions
-    own = len(targets)
-    values.rows[:own], values.targets[:own] = conditions, targets
+    own = system.fill_conditions(values)
     if row is not None:
         values.rows[own], values.targets[own] = row, target
     x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))

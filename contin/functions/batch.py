@@ -232,15 +232,17 @@ class Batch:
         request = Request(columns.request.inputs, 1, weighted=True)
         return self._own.evaluate(request, t, u, v, p, [direction, weights])[1][:, 0]
 
-    def load(self, columns: Columns | None = None) -> Loaded:
+    def load(self, columns: Columns | None = None, order: int = 0) -> Loaded:
         """Return the program of the values or, with ``columns``, of values and derivatives, as kernels run it.
+
+        With an ``order``, it is that of the derivatives of the Jacobian along so many directions, as in `jacobian_along`.
 
         Raises
         ------
         ProblemError
             The functions are evaluated in Python.
         """
-        return self._own.load(_VALUES if columns is None else columns.request)
+        return self._own.load(_VALUES if columns is None else columns.request._replace(order=order))
 
 
 #: The values.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import contin
-from contin import BoundaryValueProblem, CycleProblem
+from contin import BoundaryValueProblem, ConnectionProblem, CycleProblem
+from contin.collocation.one_call import CONVERGED, STAGNATES, Control, correct_on_mesh
 from contin.core import newton as newton_module
 from contin.core.newton import Newton, correct
 
@@ -42,13 +43,47 @@ def cycles():
     return contin.solve(problem, lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t)), {"period": 6.3}), ["a"]
 
 
+def front():
+    """Three states and both ends apart: one projection condition at the first end, two at the last; `loop` has two and one."""
+    problem = ConnectionProblem(
+        lambda u, p: (u.v, p.c * u.v - u.u * (1 - u.u) * (u.u - p.a) + p.b * u.w, u.w + p.b * u.u * (1 - u.u)),
+        ["u", "v", "w"], {"a": 0.25, "c": 0.3, "b": 0.0}, unstable=2, stable=1,
+    )  # fmt: skip
+
+    def guess(t):
+        s = math.tanh(20 * (t - 0.5) / math.sqrt(8))
+        return (1 + s) / 2, (1 - s**2) / math.sqrt(32), 0.0
+
+    front = contin.solve(problem, guess, {"time": 40, "to_u": 1}, free=["c"])
+    return contin.trace(front, free=["b", "c"], limits={"b": (-1, 0.1)}).points[-1], ["a", "c", *problem.multipliers]
+
+
+def loop():
+    values = {"a": 0.1, "b": 1.0, "alpha": 0.1, "beta": 1.0, "gamma": 0.0, "mu": 0.0, "nu": 0.0}
+
+    def leaf(u, p):
+        leaf = p.nu - p.alpha * u.z
+        return (
+            p.a * u.x + p.b * u.y - p.a * u.x**2 + leaf * u.x * (2 - 3 * u.x),
+            p.b * u.x + p.a * u.y - 1.5 * p.b * u.x**2 - 1.5 * p.a * u.x * u.y - 2 * leaf * u.y,
+            -2 * u.z + p.mu * u.x + p.gamma * u.x * u.z + p.alpha * p.beta * (u.x**2 * (1 - u.x) - u.y**2),
+        )
+
+    def guess(t):
+        x = 1 / math.cosh(10 * (t - 0.5)) ** 2
+        return x, -x * math.tanh(10 * (t - 0.5)), 0.0
+
+    problem = ConnectionProblem(leaf, ["x", "y", "z"], values, unstable=1)
+    return contin.solve(problem, guess, {"time": 20}, free=["nu"]), ["a", "nu", *problem.multipliers]
+
+
 def system_of(make):
     point, free = make()
     system, x = point.system.with_free([*free, *([] if "period" not in point.system.free else ["period"])], point.x)
     return system, x
 
 
-@pytest.mark.parametrize("make", [bratu, with_an_integral, scaled, cycles])
+@pytest.mark.parametrize("make", [bratu, with_an_integral, scaled, cycles, front, loop])
 @pytest.mark.parametrize("off", [1e-3, 3e-2])
 def test_the_same_as_in_python(make, off, monkeypatch):
     system, x = system_of(make)
@@ -77,3 +112,26 @@ def test_conditions_of_the_call_count():
     other = correct(turned, x, row, 0.1, Newton(1e-11))
     assert np.abs(turned.residual(other.x)).max() < 1e-9 and np.abs(other.x - first.x).max() > 1e-2
     assert np.abs(system.residual(correct(system, x, row, 0.1, Newton(1e-11)).x)).max() < 1e-9
+
+
+@pytest.mark.parametrize("make", [front, loop])
+def test_projection_conditions_are_those_of_python(make):
+    system, x = system_of(make)
+    moved = x + 1e-3 * np.random.default_rng(2).standard_normal(x.size)
+    values, rows = system.conditions_with_rows(moved)
+    room, own = system.workspace.values, system.fill_conditions(system.workspace.values)
+    room.rows[-1] = system.weights
+    given = system.unfilled_factors().room, Control(1e-12, 0, 0, 1), moved, system.weights, np.empty(x.size), np.empty(10)
+    assert correct_on_mesh(system.workspace, *given) == CONVERGED
+    assert room.projections.values == pytest.approx(values[:-1], abs=1e-14) and len(values) == own
+    assert np.abs(room.rows[:own] - rows).max() < 1e-12
+
+
+def test_python_decides_where_other_eigenvalues_would_be_met():
+    """Near a reference that is none, the space that Newton's method finds is not that of the least eigenvalues."""
+    system, x = system_of(front)
+    room = system.workspace.values
+    system.fill_conditions(room)
+    room.projections.first.frame[:] = room.projections.first.frame[::-1].copy()
+    given = system.unfilled_factors().room, Control(1e-12, 5, 0, 0), x.copy(), system.weights, np.empty(x.size), np.empty(20)
+    assert correct_on_mesh(system.workspace, *given) == STAGNATES
