@@ -24,16 +24,19 @@ RECORDED = SCRIPTS / "side_by_side" / "auto_07p.json"
 LONGEST = 900
 
 
-def alone(name: str, repeats: int) -> None:
+def alone(name: str, repeats: int, as_auto: bool) -> None:
     """Run contin's side of one demo in this process, and print its points and times as JSON."""
     from side_by_side import ours
 
+    if as_auto:
+        ours.take_autos_tolerances()
     print(json.dumps(ours.run(name, repeats)))
 
 
-def contin_of(name: str, repeats: int) -> dict:
-    """Run contin's side of a demo in a process of its own."""
+def contin_of(name: str, repeats: int, as_auto: bool = False) -> dict:
+    """Run contin's side of a demo in a process of its own, on request with AUTO's tolerances."""
     command = [sys.executable, str(Path(__file__).resolve()), "--alone", name, "--repeats", str(repeats)]
+    command += ["--as-auto"] if as_auto else []
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, env=os.environ.copy())
     if done.returncode:
         return {"failed": done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "no message"}
@@ -74,6 +77,7 @@ def arguments(argv=None) -> argparse.Namespace:
         "--kept", metavar="FILE", default="demos.json", help="contin's results are kept here (default: demos.json)"
     )
     parser.add_argument("--alone", metavar="NAME", help=argparse.SUPPRESS)
+    parser.add_argument("--as-auto", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args(argv)
     if options.auto_demos and not (Path(options.auto_demos) / "ab").is_dir():
         parser.error(f"--auto-demos {options.auto_demos!r}: must be a folder that holds AUTO's demos, ab among them")
@@ -86,7 +90,7 @@ def main(argv=None) -> int:
     """Run the command; return the exit code."""
     options = arguments(argv)
     if options.alone:
-        alone(options.alone, options.repeats)
+        alone(options.alone, options.repeats, options.as_auto)
         return 0
     from side_by_side import page
     from side_by_side.all_demos import DEMOS
@@ -107,7 +111,8 @@ def main(argv=None) -> int:
             RECORDED.write_text("{\n" + ",\n".join(lines) + "\n}\n")
         if options.only_auto:
             continue
-        kept[demo.name] = contin_of(demo.name, 0 if demo.slow else options.repeats)
+        repeats = 0 if demo.slow else options.repeats
+        kept[demo.name] = {**contin_of(demo.name, repeats), "as_auto": contin_of(demo.name, repeats, as_auto=True)}
         kept_file.write_text(json.dumps(kept) + "\n")
         print(page.line(demo, recorded.get(demo.name), kept[demo.name]), flush=True)
     if options.page:

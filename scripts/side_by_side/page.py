@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from side_by_side.compare import Row, rows, verdict
+import numpy as np
+
+from side_by_side.compare import Row, gap, nearest, rows, verdict
 from side_by_side.record import Demo
 
 #: What is generated stands between these two lines of the page.
@@ -28,7 +31,8 @@ def line(demo: Demo, auto: dict | None, ours: dict) -> str:
     if "failed" in ours:
         return f"{demo.name}: contin failed: {ours['failed']}"
     counts = Counter(verdict(row) for part in compared(demo, auto, ours) for row in part)
-    seconds = f"contin {ours['again']:.2f} s, first {ours['first']:.1f} s, AUTO {seconds_of(demo, auto):.2f} s"
+    again = f"contin {ours['again']:.2f} s, with AUTO's tolerances {as_auto_of(ours)}"
+    seconds = f"{again}, first {ours['first']:.1f} s, AUTO {seconds_of(demo, auto):.2f} s"
     return f"{demo.name}: {', '.join(f'{count} {words}' for words, count in counts.items())}; {seconds}"
 
 
@@ -38,6 +42,27 @@ def seconds_of(demo: Demo, auto: dict | None) -> float:
         return math.nan
     last = max(number for part in demo.parts for number in part.runs)
     return sum(run["seconds"] for run in auto["runs"][: last + 1])
+
+
+def as_auto_of(ours: dict) -> str:
+    """Return the processor seconds of contin with AUTO's tolerances, as text."""
+    found = ours["as_auto"]
+    return "failed" if "failed" in found else f"{found['again']:.2f}"
+
+
+def off(demo: Demo, auto: dict | None, ours: dict) -> list[tuple[float, float]]:
+    """Return how far AUTO's points and those of contin with AUTO's tolerances are off, relative to max(1, |value|).
+
+    They are compared with contin's at its own tolerances, where both programs have the point and a third method is on the side
+    of contin, or all are equal. Infinity is a point that contin has no more.
+    """
+    found = []
+    for part, pairs, coarse in zip(demo.parts, compared(demo, auto, ours), ours["as_auto"].get("points", ())):
+        for row in pairs:
+            if row.auto and row.contin and group(verdict(row)) in ("equal", "contin"):
+                again = nearest(coarse, row.label, row.contin, part.near)
+                found.append((gap(row.auto, row.contin), gap(again["values"], row.contin) if again else math.inf))
+    return found
 
 
 def number(values: Sequence[float] | None, which: int, digits: int = 10) -> str:
@@ -77,9 +102,14 @@ def group(words: str) -> str:
 
 HEADINGS = (
     "demo", "", "points", "equal", "contin closer", "AUTO closer", "not decided", "only AUTO", "only contin", "AUTO, s",
-    "contin, s", "first, s",
+    "contin, s", "as AUTO, s", "first, s", "AUTO off", "contin as AUTO off",
 )  # fmt: skip
 GROUPS = "equal", "contin", "AUTO", "open", "AUTO only", "contin only"
+
+
+def medians(pairs: Sequence[tuple[float, float]]) -> list[str]:
+    """Return the medians of the first and of the second numbers of pairs, as text."""
+    return [f"{statistics.median(side):.0e}" for side in zip(*pairs)] or ["", ""]
 
 
 def summary(demos: Sequence[Demo], auto: dict, ours: dict) -> list[str]:
@@ -89,20 +119,26 @@ def summary(demos: Sequence[Demo], auto: dict, ours: dict) -> list[str]:
         "|---" * len(HEADINGS) + "|",
     ]
     total: Counter = Counter()
+    sums, apart = np.zeros(3), []
     for demo in demos:
         if not demo.parts or demo.name not in ours:
             continue
         found = ours[demo.name]
         if "failed" in found:
-            lines.append(f"| {demo.name} | {demo.title} | contin failed: {found['failed']} |" + " |" * 9)
+            lines.append(f"| {demo.name} | {demo.title} | contin failed: {found['failed']} |" + " |" * (len(HEADINGS) - 3))
             continue
         words = [verdict(row) for part in compared(demo, auto.get(demo.name), found) for row in part]
         counts = Counter(map(group, words))
         total.update(counts)
         cells = [f"[{demo.name}](#{demo.name})", demo.title, str(len(words)), *(str(counts[name] or "") for name in GROUPS)]
-        times = [f"{seconds_of(demo, auto.get(demo.name)):.2f}", f"{found['again']:.2f}", f"{found['first']:.1f}"]
-        lines.append("| " + " | ".join(cells + times) + " |")
-    cells = ["", "all", str(sum(total.values())), *(str(total[name] or "") for name in GROUPS), "", "", ""]
+        auto_seconds = seconds_of(demo, auto.get(demo.name))
+        distances = off(demo, auto.get(demo.name), found)
+        apart += distances
+        times = [f"{auto_seconds:.2f}", f"{found['again']:.2f}", as_auto_of(found), f"{found['first']:.1f}"]
+        sums += auto_seconds, found["again"], found["as_auto"].get("again", math.nan)
+        lines.append("| " + " | ".join(cells + times + medians(distances)) + " |")
+    cells = ["", "all", str(sum(total.values())), *(str(total[name] or "") for name in GROUPS)]
+    cells += [*(f"{seconds:.1f}" for seconds in sums), "", *medians(apart)]
     return [*lines, "| " + " | ".join(cells) + " |"]
 
 
