@@ -75,13 +75,15 @@ def scaled(
     sizes, held = system.largest(x), dict(zip(problem.parameters, np.abs(system.parameters)))
     values = {**held, **dict(zip(names, sizes))}
     stated = {name: max(size, values[name]) for name, size in declared(problem, "sizes").items()} | dict(stated)
-    if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
+    alike: Mapping[str, str] = getattr(problem, "alike", {})
+    given = {name: values[other] for name, other in alike.items() if values[other] >= USUAL[0]} | stated
+    unknown = [name for name, size in zip(names, sizes) if max(size, given.get(name, 0.0)) < USUAL[0]]
+    if unknown or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
-        sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
+        sizes = first.sizes(np.array([given.get(name, 0.0) for name in names]), _said(primary, settings))
         small = [name for name, size in held.items() if 0 < size < USUAL[0]]
         counting = first.counting(small, held, sizes) if small else small
         held |= {name: 0.0 for name in small if name not in counting}
-    alike: Mapping[str, str] = getattr(problem, "alike", {})
     known = dict(zip(names, sizes))
     sizes = np.array([stated.get(name, known[alike.get(name, name)]) for name in names])
     of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
@@ -91,11 +93,15 @@ def scaled(
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order."""
+    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order.
+
+    It is ``pure`` if nothing but round-off is left in it of other eigenvectors.
+    """
 
     vector: Array
     rate: float
     order: int
+    pure: bool
 
     @property
     def distance(self) -> float:
@@ -291,7 +297,8 @@ class _FirstPoint:
         errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
         found = self._kept(mode, self.system.largest(mode) > errors)
         alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
-        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order)
+        pure = bool(np.all(self.system.largest(missed) <= APART * self.system.largest(mode)))
+        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order, pure)
 
     def _parted(self, v: Array, direction: Array, order: int) -> tuple[Array, float] | None:
         """Return the eigenvector of the largest eigenvalue in the Krylov space of v, and that; None where it is complex."""
@@ -319,6 +326,8 @@ class _FirstPoint:
 
         They belong to what the power method has left of other eigenvectors, where symmetry makes them zero.
         """
+        if mode.pure:
+            return self._branch(mode)
         again = mode.vector
         for _ in range(2):  # the sign is that of the first again
             again = self._changed(again, self.tangent, mode.order) / mode.rate
