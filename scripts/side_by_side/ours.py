@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import statistics
 import sys
 import time
+from collections.abc import Callable
 
 from contin import MeshControl, Newton, Settings
 from side_by_side.all_demos import DEMOS
@@ -31,16 +32,19 @@ def forget() -> None:
 
 
 def take_autos_tolerances() -> None:
-    """Make tolerances as those of AUTO's demos the defaults of this process, and compute no errors of labelled points.
+    """Let this process run all demos with tolerances as those of AUTO's, and compute no errors of labelled points.
 
     EPSL and EPSU are 1e-6 to 1e-8 there. AUTO's meshes have fixed numbers of intervals: its points are off by 1e-7 (median) to
     1e-5, and so this tolerance of meshes is no stricter than what the demos are run with.
     """
     for kind, name, value in ((Newton, "tolerance", 1e-7), (MeshControl, "tolerance", 1e-5), (Settings, "errors", False)):
-        names = [field.name for field in dataclasses.fields(kind)]
-        defaults = list(kind.__init__.__defaults__)
-        defaults[names.index(name) - len(names)] = value
-        kind.__init__.__defaults__ = tuple(defaults)
+        kind.__init__ = functools.partialmethod(_made_with, kind.__init__, name, value)
+
+
+def _made_with(made: object, init: Callable[..., None], name: str, value: object, *given: object, **named: object) -> None:
+    """Make settings with one of their values, whatever a demo states of it."""
+    init(made, *given, **named)
+    object.__setattr__(made, name, value)
 
 
 def branches(demo: Demo) -> list:
