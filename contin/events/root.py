@@ -17,6 +17,9 @@ from contin.levels import CORRECTED, MOST_HALVINGS
 
 #: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
 _IDLE = 1e3
+#: Values scatter, which is round-off, where the bracket closes to this part, in so many evaluations or more, and the larger one
+#: at its ends is not half as small: even with the slope of a cube root it is, where the bracket closes to an eighth.
+_NOISY, _OFTEN = 1e-2, 4
 #: A value where the bracket closes is no zero if it is above this part of the larger one at its first ends: the function jumps.
 #: At a zero with an infinite slope, as of a square root, it is 1e-6 of them.
 _JUMP = 1e-3
@@ -34,8 +37,8 @@ def find_zero(
     """Return a zero of ``function`` between two places where its values differ in sign: a place where it was evaluated.
 
     Inverse quadratic interpolation through the last three places, the secant method with the Anderson-Björck rule where that
-    leaves the bracket or the ``guess`` is missing. Ends when the next step would be below ``tolerance``, or when close to that
-    the values no longer fall: they are round-off.
+    leaves the bracket or the ``guess`` is missing, bisection where neither makes progress. Ends when the next step would be
+    below ``tolerance``, or when the values no longer fall: they are round-off.
 
     Raises
     ------
@@ -52,6 +55,7 @@ def find_zero(
         return a if fa == 0 else b
     known, beyond, closed = [left, right], fa, _CLOSED * abs(b - a)
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
+    since, fallen, width = 0, max(abs(fa), abs(fb)), abs(b - a)
     small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))
     # A value that stays above the level has not come nearer to zero.
     level = least / 2 if least > CORRECTED * max(abs(fa), abs(fb)) else np.inf
@@ -82,10 +86,17 @@ def find_zero(
         if move <= tolerance and abs(fc) <= small:
             return c
         idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
-        best = min(best, (abs(fc), c))
-        if idle == 2 and best[0] <= small:
+        best, larger, since = min(best, (abs(fc), c)), max(abs(beyond), abs(fb)), since + 1
+        if larger < fallen / 2:
+            fallen, width, since = larger, abs(b - a), 0
+        scatters = since >= _OFTEN and abs(b - a) < _NOISY * width
+        if best[0] <= small and (idle == 2 or scatters):
             return best[1]
-        c = following
+        # as an exponential function does, seen from where it is flat
+        stands = since >= _OFTEN and abs(b - a) > width / 2
+        c = (a + b) / 2 if stands and move > _IDLE * tolerance and abs(fc) > least / 2 else following
+    if best[0] <= CORRECTED * small:  # a zero of a higher order, to which values fall slowly
+        return best[1]
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
 
 

@@ -19,6 +19,7 @@ FUNCTIONS = {
     "pole near by": (lambda x: 1 / (x + 0.01) - 5, 0.0, 3.0, 0.19),
     "straight": (lambda x: 3 * (x - 0.7), 0.0, 1.0, 0.7),
     "falling": (lambda x: 1 - x**3, 0.2, 1.9, 1.0),
+    "flat at one end": (lambda x: math.exp(30 * (x - 0.4)) - 1e-3, -0.6, 1.0, 0.4 - math.log(1e3) / 30),
 }
 
 
@@ -90,10 +91,18 @@ def test_the_tolerance_is_one_of_the_place():
 
 @pytest.mark.parametrize("noise", [1e-8, 1e-5])
 def test_a_function_with_noise_is_located_to_its_noise(noise):
-    """A slope of one: no place can be told from the zero by less than the noise."""
-    random = np.random.default_rng(0)
-    found = find_zero(lambda x: x - 0.4 + noise * random.uniform(-1, 1), (0.0, -0.4), (1.0, 0.6), 1e-12)
-    assert found == pytest.approx(0.4, abs=3 * noise)
+    """A slope of one: no place can be told from the zero by less than the noise, and few are looked at."""
+    random, places = np.random.default_rng(0), []
+    function = counted(lambda x: x - 0.4 + noise * random.uniform(-1, 1), places)
+    assert find_zero(function, (0.0, -0.4), (1.0, 0.6), 1e-12) == pytest.approx(0.4, abs=3 * noise)
+    assert len(places) <= 12  # 14 to 27 where only places at a distance of round-off are compared
+
+
+@pytest.mark.parametrize(("power", "error"), [(3, 1e-8), (5, 1e-5)])
+def test_a_zero_of_higher_order_is_found(power, error):
+    """Values are below 1e-15 of those at the ends within this distance."""
+    function = lambda x: (x - 0.3) ** power  # noqa: E731
+    assert find_zero(function, *ends(function, 0.0, 1.0), 1e-12) == pytest.approx(0.3, abs=error)
 
 
 def test_a_jump_is_not_taken_for_a_zero_where_the_place_is_to_be_known_better_than_round_off():
