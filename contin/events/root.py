@@ -55,15 +55,12 @@ def find_zero(
         return a if fa == 0 else b
     known, beyond, closed = [left, right], fa, _CLOSED * abs(b - a)
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
-    since, fallen, width = 0, max(abs(fa), abs(fb)), abs(b - a)
+    course = _Course(abs(b - a), max(abs(fa), abs(fb)))
     small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))
     # A value that stays above the level has not come nearer to zero.
     level = least / 2 if least > CORRECTED * max(abs(fa), abs(fb)) else np.inf
     for _ in range(MOST_HALVINGS):
-        if c is None or not min(a, b) < c < max(a, b):
-            c = b - fb * (b - a) / (fb - fa)
-            if not min(a, b) < c < max(a, b):
-                c = (a + b) / 2
+        c = _inside(c, (a, fa), (b, fb))
         fc = function(c)
         if fc == 0:
             return c
@@ -78,7 +75,7 @@ def find_zero(
         known = [*known[-2:], (c, fc)]
         following = _interpolated(known)
         if following is None:
-            following = b - fb * (b - a) / (fb - fa)
+            following = _secant((a, fa), (b, fb))
         move = abs(following - c)
         if move < _IDLE * tolerance and level <= abs(fc) <= small:
             c = (a + b) / 2  # it is as small all along one side, and jumps somewhere
@@ -86,18 +83,42 @@ def find_zero(
         if move <= tolerance and abs(fc) <= small:
             return c
         idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
-        best, larger, since = min(best, (abs(fc), c)), max(abs(beyond), abs(fb)), since + 1
-        if larger < fallen / 2:
-            fallen, width, since = larger, abs(b - a), 0
-        scatters = since >= _OFTEN and abs(b - a) < _NOISY * width
-        if best[0] <= small and (idle == 2 or scatters):
+        best, closed_to = min(best, (abs(fc), c)), course.closed_to(abs(b - a), max(abs(beyond), abs(fb)))
+        if best[0] <= small and (idle == 2 or closed_to < _NOISY):
             return best[1]
-        # as an exponential function does, seen from where it is flat
-        stands = since >= _OFTEN and abs(b - a) > width / 2
-        c = (a + b) / 2 if stands and move > _IDLE * tolerance and abs(fc) > least / 2 else following
+        # It stands still as for an exponential function seen from where that is flat.
+        c = (a + b) / 2 if closed_to > 0.5 and move > _IDLE * tolerance and abs(fc) > least / 2 else following
     if best[0] <= CORRECTED * small:  # a zero of a higher order, to which values fall slowly
         return best[1]
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
+
+
+def _inside(place: float | None, one: Value, other: Value) -> float:
+    """Return a place if it lies between two others, else where the secant has its zero, or else the middle."""
+    low, high = sorted((one[0], other[0]))
+    if place is None or not low < place < high:
+        place = _secant(one, other)
+    return place if low < place < high else (low + high) / 2
+
+
+def _secant(one: Value, other: Value) -> float:
+    """Return where the straight line through two places has value zero."""
+    (a, fa), (b, fb) = one, other
+    return b - fb * (b - a) / (fb - fa)
+
+
+class _Course:
+    """How a bracket closes, while the larger value at its ends does not become half as small."""
+
+    def __init__(self, width: float, value: float) -> None:
+        self._width, self._value, self._often = width, value, 0
+
+    def closed_to(self, width: float, value: float) -> float:
+        """Return to which part it has closed since the value was last half as small; NaN where that is not long ago."""
+        self._often += 1
+        if value < self._value / 2:
+            self._width, self._value, self._often = width, value, 0
+        return width / self._width if self._often >= _OFTEN else math.nan
 
 
 def _interpolated(known: list[Value]) -> float | None:
