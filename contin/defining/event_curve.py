@@ -26,17 +26,18 @@ from contin.core.differences import derivative
 from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Event, Trial
-from contin.defining.system import Defining
+from contin.defining.system import Defining, Known
 from contin.draws import generator
 from contin.events.arc import SpecialPoint
 from contin.linalg.border import orthonormal, rows_fit
 
 
 class _Solutions(NamedTuple):
-    """x - y, and V as rows (k, size)."""
+    """x - y, V as rows (k, size), and what they come from."""
 
     x: Array
     tangents: Array
+    known: Known
 
 
 class EventCurve(Defining):
@@ -79,7 +80,12 @@ class EventCurve(Defining):
         right_sides = np.eye(len(rows) + 1, self.size, self.size - len(rows) - 1)
         right_sides[0] = np.append(residual, np.zeros(len(rows)))
         solutions = factors.solve(right_sides)
-        return _Solutions(x - solutions[0], solutions[1:])
+        return _Solutions(x - solutions[0], solutions[1:], Known(residual, factors, solutions[1:]))
+
+    def known(self, x: Array) -> Known | None:
+        """Return the matrix M, where the gradient is taken on the solutions."""
+        found: _Solutions | None = self.at(x) if self._gradient is None else None
+        return None if found is None else found.known
 
     def value(self, x: Array) -> float:
         """Return e at x."""
@@ -97,7 +103,7 @@ class EventCurve(Defining):
         """Return the derivatives of e by x."""
         if self._gradient is not None:
             return self._gradient(self.base, x)[None]
-        there, tangents = self.at(x)
+        there, tangents, _ = self.at(x)
         slopes = [derivative(lambda s: self.value(there + s * v), 1, 1 / np.abs(v).max())[0] for v in tangents]  # noqa: B023
         gradient: Array = np.array(slopes) @ self.borders
         return gradient[None]

@@ -13,7 +13,7 @@ from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Event, Trial
-from contin.defining.system import Defining
+from contin.defining.system import Defining, Known
 from contin.events.extrema import Stationarity, curvatures
 
 
@@ -41,6 +41,11 @@ class ExtremumCurve(Defining):
         if self.borders is None:
             self.borders = Stationarity(self.base, x, self.objective, held).orthonormal() * self.base.weights
         return Stationarity(self.base, x, self.objective, held, self.borders)
+
+    def known(self, x: Array) -> Known:
+        """Return the matrix M."""
+        found: Stationarity = self.at(x)
+        return Known(found.residual, found.factors, found.solutions)
 
     def borders_fit(self, x: Array) -> bool:
         """Return whether the tangents have not turned away from the rows Phi."""

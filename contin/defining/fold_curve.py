@@ -20,7 +20,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
-from contin.defining.system import Defining
+from contin.defining.system import Defining, Known
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.interpolated import meeting
 from contin.linalg.border import Bordered, null_vectors
@@ -41,28 +41,49 @@ class FoldCurve(Defining):
 
     kind = Label.FOLD
 
-    def computed(self, x: Array) -> Bordered:
-        """Return the bordered matrix: both parameters, and those that fix the solution besides, stay where they are."""
-        base = self.base
-        places = [base.state_size, *range(base.equations + 1, base.size)]
+    @property
+    def _held(self) -> list[int]:
+        """Places of both parameters, the second one last, and of those that fix the solution besides."""
+        return [self.base.state_size, *range(self.base.equations + 1, self.base.size)]
+
+    def computed(self, x: Array) -> tuple[Bordered, Array]:
+        """Return the bordered matrix, with the parameters held where they are, and the residual of F."""
+        base, places = self.base, self._held
         held = np.zeros((len(places), base.size + 1))
         held[np.arange(len(places)), places] = 1.0
-        shape = base.equations, base.size
+        shape, residual = (base.equations, base.size), np.empty(0)
 
         def bordered(b: Array, c: Array) -> Bordered:
-            return Bordered(base.linearize(x, np.vstack([held, np.append(c, 0.0)]), b[None, :])[1], shape)
+            nonlocal residual
+            residual, factors = base.linearize(x, np.vstack([held, np.append(c, 0.0)]), b[None, :])
+            return Bordered(factors, shape, held=len(places))
 
         found, self.borders = null_vectors(bordered, shape, self.borders, base.weights)
-        return found
+        return found, residual
+
+    def known(self, x: Array) -> Known:
+        """Return the bordered matrix."""
+        found, residual = self.at(x)
+        return Known(residual, found.factors, found.solutions)
 
     def null_vectors(self, x: Array) -> tuple[Array, Array]:
         """Return v (size,) and w (equations of F,)."""
-        found: Bordered = self.at(x)
+        found: Bordered = self.at(x)[0]
         return found.right[0], found.left[0]
+
+    def by_parameters(self, x: Array) -> tuple[float, float]:
+        """Return the products of w with the derivatives of F by the parameter of the folds and by the second parameter.
+
+        The rows of the parameters that are held, and c, take up what w F_x leaves there.
+        """
+        found: Bordered = self.at(x)[0]
+        *held, rest = found.transposed[0, self.base.equations :]
+        products = -np.array(held) - rest * self.borders[1][self._held]
+        return float(products[0]), float(products[-1])
 
     def own_values(self, x: Array) -> Array:
         """Return g."""
-        found: Bordered = self.at(x)
+        found: Bordered = self.at(x)[0]
         g: Array = found.g[0]
         return g
 
@@ -84,7 +105,7 @@ class FoldCurve(Defining):
 def _bend(trial: Trial) -> float:
     """Return w.F_zz v v."""
     curve = cast(FoldCurve, trial.system)
-    return -float(curve.own_gradients(trial.x)[0] @ curve.null_vectors(trial.x)[0])
+    return -float(curve.once(curve.own_gradients, trial.x)[0] @ curve.null_vectors(trial.x)[0])
 
 
 def _may_be_cusp(arc: Arc) -> bool:
@@ -98,21 +119,14 @@ def _may_be_cusp(arc: Arc) -> bool:
     return bool(before @ behind < 0) and _singular_point(arc) is None
 
 
-def _by_parameters(trial: Trial) -> Array:
-    """Return the products of w with the derivatives of F by the parameter of the folds and by the second parameter."""
-    curve = cast(FoldCurve, trial.system)
-    product = curve.base.transposed_product(trial.x, curve.null_vectors(trial.x)[1])
-    return product[[curve.base.state_size, -1]]
-
-
 def _by_first(trial: Trial) -> float:
     """Return w.F_lambda of the parameter of the folds."""
-    return float(_by_parameters(trial)[0])
+    return cast(FoldCurve, trial.system).by_parameters(trial.x)[0]
 
 
 def _by_last(trial: Trial) -> float:
     """Return w.F_mu of the second parameter."""
-    return float(_by_parameters(trial)[1])
+    return cast(FoldCurve, trial.system).by_parameters(trial.x)[1]
 
 
 @functools.lru_cache(maxsize=1)

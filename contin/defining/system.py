@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.linalg.factors import Factors
+from contin.linalg.replaced import ReplacedRows
 from contin.problems.statement import Statement, multipliers_of, phases_of
 from contin.problems.vector_field import found_elsewhere
 
@@ -39,6 +40,14 @@ from contin.problems.vector_field import found_elsewhere
 _SHRUNK = 3e-3
 
 T = TypeVar("T")
+
+
+class Known(NamedTuple):
+    """A residual F, factors of [F_x, columns^T; rows] with any columns and rows, and the solutions for units of all rows."""
+
+    residual: Array
+    factors: Factors
+    solutions: Array
 
 
 class Defining(Discretization):
@@ -132,6 +141,10 @@ class Defining(Discretization):
         inner = base.on_curve and not self.kind
         return base.on_its_branch(self.inside(x)) if inner else (self.kind, None)
 
+    def known(self, x: Array) -> Known | None:
+        """Return the factored matrix that the own equations are made of; None where it has other rows for F."""
+        return None
+
     # --- the equations ---------------------------------------------------------------------------------------------------
 
     def at(self, x: Array) -> Any:
@@ -152,7 +165,8 @@ class Defining(Discretization):
 
     def residual(self, x: Array) -> Array:
         """Return F + psi z, and g."""
-        return self._residual(x, self.base.residual(self.inside(x)))
+        known = self.known(x)
+        return self._residual(x, self.base.residual(self.inside(x)) if known is None else known.residual)
 
     def _residual(self, x: Array, inside: Array) -> Array:
         further = x[self.base.size :] @ self.own_vectors(x) if self.own_unknowns else 0.0
@@ -162,10 +176,14 @@ class Defining(Discretization):
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return the residual, and the factored bordered matrix: the gradients of g come first among its rows."""
-        wide, count = self.size + len(columns), self.own_equations
+        wide, count, known = self.size + len(columns), self.own_equations, self.known(x)
         rows = np.array(rows, dtype=float).reshape(-1, wide)
+        gradients = self.once(self.own_gradients, x)
+        if known is not None and not len(columns):
+            replaced = ReplacedRows(known.factors, known.solutions, np.vstack([gradients, rows]))
+            return self._residual(x, known.residual), replaced
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        top = np.hstack([self.own_gradients(x), columns[:, -count:].T])
+        top = np.hstack([gradients, columns[:, -count:].T])
         beside = np.vstack([self.own_vectors(x), columns[:, :-count]])
         residual, factors = self.base.linearize(self.inside(x), np.vstack([top, rows]), beside)
         return self._residual(x, residual), factors

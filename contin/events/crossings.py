@@ -27,6 +27,7 @@ from contin.linalg.condensation import Factorization
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.ends import compared, is_near_one
 from contin.linalg.factors import Factors
+from contin.linalg.replaced import ReplacedRows
 from contin.linalg.singular import fill_products, orthonormalize, random_rows
 
 #: Size of the largest matrix of which all eigenvalues are computed at once (some 5 ms). The iteration takes a tenth of that;
@@ -133,6 +134,9 @@ def _is_condensed(factors: object) -> bool:
 
 def _condensed(before: Any, after: Any) -> Array | None:
     """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
+    if isinstance(before, ReplacedRows) and isinstance(after, ReplacedRows):  # what is not small is regular all along
+        quotient = DenseFactors(after.small).solve(before.small.T)
+        return quotient if before.factors.sign == after.factors.sign and np.isfinite(quotient).all() else None
     if not (_is_condensed(before) and _is_condensed(after)):
         return None
     quotient, turn = compared(before.ends, after.ends)

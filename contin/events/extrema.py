@@ -47,6 +47,8 @@ class Stationarity:
     kernel : ndarray, shape (j, size)
         V, as rows.
     g : ndarray, shape (j,)
+    residual, factors, solutions
+        F, the factors of M, with rows of what is held, and the solutions for units of all rows besides F_x.
     by_held : ndarray
         At an extremum, the derivatives of G by the unknowns that are held, the extremum staying one.
     """
@@ -59,11 +61,10 @@ class Stationarity:
         rows[np.arange(len(held)), list(held)] = 1.0
         rows[len(held) :] = phi
         self._system, self._x, self._column = system, x, column
-        _, factors = system.linearize(x, rows)
-        unit = np.zeros((count, system.size))
-        unit[:, system.size - count :] = np.eye(count)
-        self.kernel: Array = factors.solve(unit)
-        solution = factors.solve_transposed(gradient_of(system, x, column))
+        self.residual, self.factors = system.linearize(x, rows)
+        self.solutions = self.factors.solve(np.eye(len(rows), system.size, system.equations))
+        self.kernel: Array = self.solutions[len(held) :]
+        solution = self.factors.solve_transposed(gradient_of(system, x, column))
         self.multipliers: Array = solution[: system.equations]
         self.by_held: Array = solution[system.equations : system.size - count]
         self.g: Array = solution[system.size - count :]

@@ -31,7 +31,8 @@ from contin.events.labelled import Finding
 from contin.events.root import find_zero
 from contin.levels import BESIDE, ROUGH
 
-#: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate.
+#: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate: that of the coefficients of a
+#: polynomial through the first, and that of the nodes on another mesh.
 _NODES = 12, 10
 #: Half the width of the interval of the nodes as parts of the step: narrow ones suffer from nodes that are close to the zero,
 #: wide ones from bends of the curve. Narrower ones are tried as long as they lower the estimated error.
@@ -117,9 +118,9 @@ class InterpolatedZero(Finding):
         old = self.window
         state = standing_at(system, carry(old.state.x), carry(old.state.tangent), old.state.step)
         window = Window(state, self.at, old.width, _NODES[old.count == _NODES[0]])
-        through = _polynomial(old, self.points)
+        through = _polynomial(old, self.points, old.count)
         points = [located(state, carry(through(place)), float(place), newton) for place in window.places]
-        return _interpolated(window, points, self.functions)
+        return _interpolated(window, points, self.functions, window.count)
 
 
 def interpolated_zero(arc: Arc, functions: Functions, near: float) -> InterpolatedZero | None:
@@ -127,8 +128,9 @@ def interpolated_zero(arc: Arc, functions: Functions, near: float) -> Interpolat
     best, least = None, np.inf
     for share in _WIDTHS:
         try:
-            windows = [Window(arc.state, near, share * arc.step, count) for count in _NODES]
-            found, other = (_around(arc, window, functions) for window in windows)
+            window = Window(arc.state, near, share * arc.step, _NODES[0])
+            points = _around(arc, window)
+            found, other = (_interpolated(window, points, functions, count) for count in _NODES)
         except ConvergenceError:
             continue
         change = float(np.abs(found.trial.x - other.trial.x).max())
@@ -158,8 +160,8 @@ def meeting(arc: Arc, test: Event, functions: Functions, small: float, stops: st
     return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
 
 
-def _around(arc: Arc, window: Window, functions: Functions) -> InterpolatedZero:
-    """Return the zero from points that are found one after the other, each from an extrapolation of those before.
+def _around(arc: Arc, window: Window) -> list[Trial]:
+    """Return the points at the nodes, found one after the other, each from an extrapolation of those before.
 
     The end of the step may be so near to the zero that neither its tangent nor its factors are of use.
     """
@@ -172,7 +174,7 @@ def _around(arc: Arc, window: Window, functions: Functions) -> InterpolatedZero:
         else:
             guess = _through(places[known], points[known], place)
         points.append(located(state, guess, float(place), arc.newton))
-    return _interpolated(window, points, functions)
+    return points
 
 
 def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
@@ -182,8 +184,8 @@ def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
     return guess
 
 
-def _interpolated(window: Window, points: Sequence[Trial], functions: Functions) -> InterpolatedZero:
-    """Return the zero from the points at the nodes.
+def _interpolated(window: Window, points: Sequence[Trial], functions: Functions, count: int) -> InterpolatedZero:
+    """Return the zero from the points at the nodes, by polynomials of so many coefficients.
 
     Raises
     ------
@@ -191,7 +193,7 @@ def _interpolated(window: Window, points: Sequence[Trial], functions: Functions)
         The functions have no common zero in the middle half of the window.
     """
     values = np.array([[function(point) for function in functions] for point in points])
-    test = _polynomial(window, values)
+    test = _polynomial(window, values, count)
     left, right = (
         (place, float(test(place)[0])) for place in (window.middle - window.width / 2, window.middle + window.width / 2)
     )
@@ -201,18 +203,21 @@ def _interpolated(window: Window, points: Sequence[Trial], functions: Functions)
     if np.any(np.abs(test(at)) > ROUGH * np.abs(values).max(axis=0)):
         raise ConvergenceError("the test functions have no common zero")
     unknowns = np.array([point.x for point in points])
-    through = _polynomial(window, unknowns)
+    through = _polynomial(window, unknowns, count)
     along, system = through(at, 1), window.state.system
     tangent = np.asarray(along, dtype=float) / float(np.sqrt(inner(system, along, along)))
     trial = Trial(system, through(at), Linearization(tangent, np.nan))
     return InterpolatedZero(trial, at, window, unknowns, functions, max(point.newton_error for point in points))
 
 
-def _polynomial(window: Window, rows: Array) -> Callable[..., Array]:
-    """Return the polynomial through rows (count, m) at the nodes: a function of the place, and of the order of a derivative."""
+def _polynomial(window: Window, rows: Array, count: int) -> Callable[..., Array]:
+    """Return the polynomial of so many coefficients that is nearest to rows (nodes, m) at the nodes.
+
+    It is a function of the place, and of the order of a derivative.
+    """
     scaled = (window.places - window.middle) / window.width
     first = rows.mean(axis=0)  # what is common to all would bring its round-off
-    weights = chebyshev.chebfit(scaled, rows - first, window.count - 1)
+    weights = chebyshev.chebfit(scaled, rows - first, count - 1)
 
     def value(place: float, order: int = 0) -> Array:
         derived = chebyshev.chebder(weights, order)

@@ -51,8 +51,8 @@ class Bordered:
         Of the bordered matrix. Other equations may stand between those of A and the rows c: their right sides are zero.
     shape : tuple of int
         Numbers of equations and of unknowns of A.
-    columns, rows : int
-        Numbers of columns b and rows c.
+    columns, rows, held : int
+        Numbers of columns b and rows c, and of other rows before these.
 
     Examples
     --------
@@ -62,27 +62,33 @@ class Bordered:
     ([[0.0, 1.0]], [[0.0]], [[1.0, 0.0]])
     """
 
-    def __init__(self, factors: Solves, shape: tuple[int, int], columns: int = 1, rows: int = 1) -> None:
-        self.factors, self._shape, self._columns, self._rows = factors, shape, columns, rows
+    def __init__(self, factors: Any, shape: tuple[int, int], columns: int = 1, rows: int = 1, held: int = 0) -> None:
+        self.factors, self._shape, self._columns, self._rows, self._held = factors, shape, columns, rows, held
 
     @functools.cached_property
-    def _solutions(self) -> Array:
-        return self.factors.solve(_units(self._shape[1] + self._columns, self._rows))
+    def solutions(self) -> Array:
+        """Those for the unit vectors of all rows besides A, shape (held + rows, unknowns + columns)."""
+        return np.asarray(self.factors.solve(_units(self._shape[1] + self._columns, self._held + self._rows)))
 
     @property
     def right(self) -> Array:
         """v, shape (rows, unknowns)."""
-        return self._solutions[:, : self._shape[1]]
+        return self.solutions[self._held :, : self._shape[1]]
 
     @property
     def g(self) -> Array:
         """g, shape (rows, columns)."""
-        return self._solutions[:, self._shape[1] :]
+        return self.solutions[self._held :, self._shape[1] :]
 
     @functools.cached_property
+    def transposed(self) -> Array:
+        """w and what belongs to the other rows, shape (columns, all equations)."""
+        return np.asarray(self.factors.solve_transposed(_units(self._shape[1] + self._columns, self._columns)))
+
+    @property
     def left(self) -> Array:
         """w, shape (columns, equations)."""
-        return self.factors.solve_transposed(_units(self._shape[1] + self._columns, self._columns))[:, : self._shape[0]]
+        return self.transposed[:, : self._shape[0]]
 
 
 def _units(size: int, count: int) -> Array:
