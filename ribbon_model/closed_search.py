@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 from collections import namedtuple
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -19,7 +20,7 @@ import numpy as np
 from contin import ContinError, MeshControl, Point, solve
 from contin.lowlevel import levels
 from ribbon_model.domains import HALF_LOOPS, Domain
-from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, on_directors, spin
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, spin
 from ribbon_model.law import Law
 from ribbon_model.linear import circle, covering
 from ribbon_model.shape import quaternions
@@ -159,10 +160,12 @@ class _Shooting:
         return np.array(path)
 
     def _rates(self, u: np.ndarray, held: np.ndarray) -> np.ndarray:
-        moment = held[:, :3] - np.cross(u[:, 4:], held[:, 3:])
-        q = u[:, :4].T
-        strains = self.law.linearized(np.array(on_directors(*q, *moment.T)).T, *self.material)[0]
-        return np.array([*spin(*q, *strains.T, 1.0), *directors(*q)[6:]]).T
+        q, (x1, x2, x3), (m1, m2, m3, r1, r2, r3) = u.T[:4], u.T[4:], held.T
+        lab = m1 - (x2 * r3 - x3 * r2), m2 - (x3 * r1 - x1 * r3), m3 - (x1 * r2 - x2 * r1)
+        frame = directors(*q)
+        moment = np.array([sum(map(operator.mul, frame[at : at + 3], lab)) for at in (0, 3, 6)])
+        strains = self.law.linearized(moment.T, *self.material)[0]
+        return np.array([*spin(*q, *strains.T, 1.0), *frame[6:]]).T
 
     def _missed(self, last: np.ndarray) -> np.ndarray:
         """Return what the conditions at the other end miss, shape (P, loads): those at S = 0 hold."""
@@ -173,12 +176,8 @@ class _Shooting:
     def _improved(self, loads: np.ndarray) -> np.ndarray:
         """Return loads after damped Newton steps; a step that does not lower what is missed is made again with more damping."""
         count = loads.shape[1]
-        damping, missed = np.full(len(loads), _DAMPING), self._missed(self.integrated(loads)[-1])
+        damping, (missed, slopes) = np.full(len(loads), _DAMPING), self._sloped(loads)
         for _ in range(_ITERATIONS):
-            change = levels.APART * (1 + np.abs(loads))
-            beside = (loads[:, None] + change[:, :, None] * np.eye(count)).reshape(-1, count)
-            slopes = self._missed(self.integrated(beside)[-1]).reshape(-1, count, count) - missed[:, None]
-            slopes = slopes / change[:, :, None]  # [strip, load, condition]
             normal = slopes @ slopes.transpose(0, 2, 1)
             normal = normal + np.eye(count) * (damping[:, None] * np.diagonal(normal, axis1=1, axis2=2))[:, None]
             fine = np.isfinite(normal).all(axis=(1, 2)) & (np.abs(np.linalg.det(normal)) > 0)
@@ -186,11 +185,24 @@ class _Shooting:
             step = -np.linalg.solve(normal, slopes @ missed[:, :, None])[:, :, 0]
             allowed = _LONGEST * (1 + np.abs(loads).max(axis=1)) / np.abs(step).max(axis=1)
             trial = loads + np.minimum(1.0, allowed)[:, None] * step
-            now = self._missed(self.integrated(trial)[-1])
+            now, beside = self._sloped(trial)
             better = fine & ((now**2).sum(axis=1) < (missed**2).sum(axis=1))
             loads, missed = (np.where(better[:, None], *pair) for pair in ((trial, loads), (now, missed)))
+            slopes = np.where(better[:, None, None], beside, slopes)
             damping = damping * np.where(better, _LESS, _MORE)
         return loads
+
+    def _sloped(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what is missed, and its slopes [strip, load, condition] by differences.
+
+        In one integration: of as few strips as these, most of its time goes to the number of its steps.
+        """
+        count = loads.shape[1]
+        change = levels.APART * (1 + np.abs(loads))
+        beside = loads[:, None] + change[:, :, None] * np.eye(count)
+        every = self._missed(self.integrated(np.concatenate([loads[:, None], beside], axis=1).reshape(-1, count))[-1])
+        every = every.reshape(-1, 1 + count, count)
+        return every[:, 0], (every[:, 1:] - every[:, :1]) / change[:, :, None]
 
 
 def _solved(law: Law, domain: Domain, states: np.ndarray, parameters: Mapping[str, float]) -> Point:

@@ -1,6 +1,8 @@
 """``ribbon COMMAND``: the same as ``python -m branches.COMMAND``."""
 
+import contextlib
 import importlib.util
+import io
 import os
 import shutil
 import subprocess
@@ -32,17 +34,14 @@ def test_help_lists_all_and_imports_nothing_heavy(command):
     assert said.endswith("False False\n")
 
 
-def test_a_command_does_the_same_as_its_module(command):
-    for name, words in {
-        "run": ["none.yaml"],
-        "paper": ["--out", "p", "nix"],
-        "strip": ["--width", "x"],
-        "export": ["x.h5"],
-    }.items():
-        ours = command(name, *words, program=PROGRAM)
-        theirs = command(*words, program=("-m", f"branches.{name}"))
-        assert (ours.returncode, ours.out, ours.err) == (theirs.returncode, theirs.out, theirs.err)
-        assert ours.returncode == 2
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("words", ["run none.yaml", "paper --out p nix", "export x.h5", "strip --width x"])
+def test_a_command_does_the_same_as_its_module(command, words):
+    name, *rest = words.split()
+    ours = command(name, *rest, program=PROGRAM)
+    theirs = command(*rest, program=("-m", f"branches.{name}"))
+    assert (ours.returncode, ours.out, ours.err) == (theirs.returncode, theirs.out, theirs.err)
+    assert ours.returncode == 2
 
 
 def test_an_unknown_command_is_answered_in_one_sentence(call):
@@ -64,6 +63,14 @@ def test_a_mistake_is_answered_with_what_to_type(command):
     assert command("help", "scenes", program=PROGRAM).out == command("scenes", "--help", program=PROGRAM).out != ""
 
 
+@pytest.fixture(scope="module")
+def completion():
+    """What bash evaluates, written once."""
+    with contextlib.redirect_stdout(io.StringIO()) as written:
+        assert cli.main(["completion", "bash"]) == 0
+    return written.getvalue()
+
+
 @pytest.mark.posix("on Windows, bash may be that of another system")
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
 @pytest.mark.parametrize(
@@ -75,9 +82,9 @@ def test_a_mistake_is_answered_with_what_to_type(command):
         ("ribbon run scen", "scene.yaml"),
     ],
 )
-def test_bash_completes(line, wanted, command, tmp_path):
+def test_bash_completes(line, wanted, completion, tmp_path):
     (tmp_path / "scene.yaml").touch()
-    (tmp_path / "completion.sh").write_text(command("completion", "bash", program=PROGRAM).out)
+    (tmp_path / "completion.sh").write_text(completion)
     words = " ".join(f"'{word}'" for word in line.split())
     program = (
         f"source completion.sh; COMP_WORDS=({words}); COMP_CWORD={len(line.split()) - 1}; COMP_LINE='{line}'; "
@@ -93,17 +100,27 @@ def test_completion_of_other_shells(command):
     assert wrong.returncode == 2 and wrong.err.startswith("error: completion: must be followed by one of bash, zsh")
 
 
+@pytest.mark.parametrize("prefix", ["ribbon ", "python -m branches."])
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_help_of_every_command_names_it(name, prefix, monkeypatch):
+    monkeypatch.setattr("branches.store.command.prefix", prefix)
+    parser = importlib.import_module(cli.COMMANDS[name][0]).parser()
+    assert parser.format_help().startswith(f"usage: {prefix}{name} ")
+
+
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", cli.COMMANDS)
 def test_help_names_the_command_that_was_typed(command, name):
     assert command(name, "--help", program=PROGRAM).out.startswith(f"usage: ribbon {name} ")
     assert command("--help", program=("-m", f"branches.{name}")).out.startswith(f"usage: python -m branches.{name} ")
 
 
-def test_scenes_of_the_package_are_listed_and_run_by_name(command, root):
-    listed = command("scenes", program=PROGRAM).out
+def test_scenes_of_the_package_are_listed_and_run_by_name(command, call, root, monkeypatch):
+    monkeypatch.setattr("branches.store.command.prefix", "ribbon ")  # which the program sets, for the rest of its process
+    listed = call(cli.main, "scenes").out
     assert all(len(line.split()) > 1 for line in listed.splitlines())
-    assert command("scenes", "--help", program=PROGRAM).out.startswith("usage: ribbon scenes")
-    assert command("scenes", "x", program=PROGRAM).err == "error: unrecognized arguments: x (--help shows what there is)\n"
+    assert call(cli.main, "scenes", "--help").out.startswith("usage: ribbon scenes")
+    assert call(cli.main, "scenes", "x").err == "error: unrecognized arguments: x (--help shows what there is)\n"
     unknown = command("run", "m1_n22", program=PROGRAM).err
     assert unknown.endswith(" (did you mean 'm1_n2'?); 'ribbon scenes' lists those of the package\n")
     assert [line.split()[0] for line in listed.splitlines()] == sorted(file.stem for file in (root / "configs").glob("*.yaml"))

@@ -195,7 +195,7 @@ def test_a_file_with_a_law_is_all_that_commands_need(tmp_path, command):
     )
     env = {"RIBBON_LAWS": "quartic.py"}
     assert "leaves the 1-covered circle at kappa_n L/2pi = 3.370" in command("closed.yaml", env=env).out
-    done = command("closed.h5", program=("-m", "branches.plot"), env=env)
+    done = command("closed.h5", "--shapes", "1", program=("-m", "branches.plot"), env=env)
     assert (done.returncode, done.out) == (0, "written to closed.pdf\n")
     preview = command("closed.yaml", program=("-m", "branches.graph"), env=env).out
     assert "quartic, twist = 1.5, core = 0.4, (1, 2): circle 1 at 3.370" in preview

@@ -69,11 +69,16 @@ KINDS = {kind.__name__: kind for kind in (equilibria, henon, bratu, cycles)}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plain_step_calls_few_python_functions(kind):
-    """In a process that finds all kernels compiled: where one was compiled, a function in Python stays before it."""
+    """In a process that finds all kernels compiled: where one was compiled, a function in Python stays before it.
+
+    The first process compiles what is not; if nothing was, its number is that of a second one.
+    """
     environment = {**os.environ, "PYTHONPATH": str(Path(contin.__file__).parent.parent)}
     for _ in range(2):
         words = [sys.executable, __file__, kind]
         done = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
+        if float(done.stdout) <= MOST:
+            break
     assert float(done.stdout) <= MOST
 
 

@@ -230,11 +230,17 @@ print(sorted({"numba", "scipy"} & set(sys.modules)))
 """
 
 
-def test_a_second_process_needs_no_compiler(tmp_path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A cache that the processes of several tests share: kernels are compiled into it once."""
+    return tmp_path_factory.mktemp("cache")
+
+
+def test_a_second_process_needs_no_compiler(folder, tmp_path):
     """Machine code on disk needs neither numba nor SciPy: loading them would take longer than most runs."""
     problem = tmp_path / "problem.py"
     problem.write_text(PROBLEM)
-    environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = {**os.environ, "CONTIN_CACHE_DIR": str(folder), "PYTHONPATH": os.pathsep.join(sys.path)}
     lines = [
         subprocess.run(
             [sys.executable, "-c", WITHOUT_NUMBA, problem], env=environment, capture_output=True, text=True, check=True
@@ -292,11 +298,11 @@ for name in sys.argv[1:]:
 """
 
 
-def test_functions_of_one_name_compiled_by_two_processes_stay_apart(tmp_path):
+def test_functions_of_one_name_compiled_by_two_processes_stay_apart(folder, tmp_path):
     """Each compiled by a process of its own, both loaded by a third: f(3) is 30 and 23."""
     script = tmp_path / "same_names.py"
     script.write_text(SAME_NAMES)
-    environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = {**os.environ, "CONTIN_CACHE_DIR": str(folder), "PYTHONPATH": os.pathsep.join(sys.path)}
 
     def run(*names):
         done = subprocess.run([sys.executable, script, *names], env=environment, capture_output=True, text=True, check=True)
