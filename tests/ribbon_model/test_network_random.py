@@ -74,12 +74,20 @@ def test_round_off_where_a_network_can_move_is_no_state(seed):
         (_random(seed) if seed == 167 else dataclasses.replace(_random(seed), numbers={"field": 2.0})).first_point()
 
 
-def test_a_state_beyond_a_fold_is_found_by_descent():
+def test_a_state_beyond_a_fold_is_found_by_descent(monkeypatch):
     """The way from the drawing turns back at 68 %; a hinge whose axis is not of unit length."""
-    network = _random(82)
-    with pytest.raises(OutOfReach, match=r"followed to 0\.681 of the way"):
-        network.first_point()
+    network, said = _random(82), []
+
+    def first_point(*given, _usual=network.first_point):
+        try:
+            return _usual(*given)
+        except OutOfReach as error:
+            said.append(str(error))
+            raise
+
+    monkeypatch.setattr(network, "first_point", first_point)
     point, how = first_state(network)
+    assert len(said) == 1 and "followed to 0.681 of the way" in said[0]
     assert how == "from the drawing, by descent of its energy"
     assert point.second_variation().index() == 0
     states = point.system.states(point.x)
@@ -92,7 +100,7 @@ def test_an_unloaded_network_has_sizes():
     assert trace(network.first_point()[0], free=["P"], max_points=6, progress=False)[-1]["P"] > 0.01
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("seed", range(200))
 def test_a_random_network_has_a_state_or_a_sentence(seed):
     network = _random(seed)
