@@ -15,6 +15,7 @@ of is computed once at each point. They follow the protocol of the system that t
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
@@ -35,9 +36,10 @@ from contin.linalg.replaced import ReplacedRows
 from contin.problems.statement import Statement, multipliers_of, phases_of
 from contin.problems.vector_field import found_elsewhere
 
-#: A curve of cycles ends where they are smaller than this part of its largest reference; parameters differ from those of the
-#: equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
-_SHRUNK = 3e-3
+#: A curve of cycles ends where they are smaller than this part of a power of two above its largest reference, which does not
+#: change with its steps; parameters differ from those of the equilibrium by the square of the size. With 1e-3 of the largest
+#: Newton's method fails: the equations are nearly singular.
+_SHRUNK = 2e-3
 
 T = TypeVar("T")
 
@@ -197,7 +199,7 @@ class Defining(Discretization):
 
         def amplitude(trial: Trial) -> float:
             system: Any = trial.system
-            return float(system.base.amplitude(system.inside(trial.x)) - _SHRUNK * system.largest)
+            return float(system.base.amplitude(system.inside(trial.x)) - _SHRUNK * 2.0 ** math.frexp(system.largest)[1])
 
         name = "the end, near a Hopf point where the cycles have no size"
         return [Event(Label.END, name, amplitude, terminal=True)] if self.base.size_of_solutions is not None else []

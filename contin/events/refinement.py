@@ -26,6 +26,9 @@ from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
+#: On a mesh of half the width the error is 2^-(2 d) of what it was: a point that moves by more than this part of the move
+#: before does so by round-off.
+_CLOSER = 0.25
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
 #: A value that is not below this part of the nearest to zero came no nearer. Ten times smaller, secants that still come nearer
@@ -72,11 +75,12 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped; one for which
-    Newton's method fails stays as it is, and has no errors. On a mesh of more
-    than ``max_intervals`` intervals only the estimate is made: the point stays on the one before.
+    is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
+    and has no errors. Where halving the mesh no longer brings it much closer, it moves by round-off: its error is the larger of
+    the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further than on the one before,
+    only the estimate is made: the point stays on the one before.
     """
-    trial, details, last = point.trial, point.details, np.inf
+    trial, details, before, last = point.trial, point.details, np.zeros(1), np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
     if finding_of(details).is_lost:
         return Refined(trial, errors, details, is_lost=True)
@@ -100,15 +104,17 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         size = 1 + np.abs(better.x[system.state_size :])
         steps = np.maximum(steps, LAST_PLACES * size.max())
         left = left + finding_of(found).round_off(system, settings.newton)
-        if np.any(steps > _FAR * size) or np.max(steps / size) > last:
+        moved = float(np.max(steps / size))
+        if np.any(steps > _FAR * size):
             is_lost = last == np.inf
             break
-        settled, steps = np.maximum(settings.mesh.tolerance * size, left) >= steps, steps + left
-        known = steps + finding_of(found).split(system)  # a curve of branch points has one unknown more
-        sizes = known[: len(system.free)] * system.free_scales
-        errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
-        if finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
+        settled = np.maximum(settings.mesh.tolerance * size, left) >= steps
+        change = np.maximum(steps, before) if moved > _CLOSER * last else steps
+        known = change + left + finding_of(found).split(system)  # a curve of branch points has one unknown more
+        errors = dict(zip(system.free, map(float, known[: len(system.free)] * system.free_scales)))
+        if moved > last or finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
             break  # such a mesh serves the estimate only
+        before, last = steps, moved
         trial, details = better, found
         if np.all(settled):
             break
