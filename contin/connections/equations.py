@@ -14,7 +14,7 @@ from contin.boundary.conditions import Conditioned
 from contin.collocation.mesh import MeshControl
 from contin.collocation.projection import Projections, projections
 from contin.collocation.workspace import Values
-from contin.core.multilinear import Numbers, shares, subsets
+from contin.core.multilinear import Numbers, alike, classes, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
 from contin.core.spectral import KEPT
@@ -163,7 +163,7 @@ class ConnectionEquations(Conditioned):
         leaves Sylvester's equation for Y.
         """
         found: list[dict[Numbers, Array]] = []
-        numbers = subsets(len(directions))
+        numbers, same = subsets(len(directions)), classes(directions)
         for end, (Q, L, solve) in enumerate(self._subspaces(p)):
             if not (len(Q) and directions):
                 found.append(dict.fromkeys(numbers, L))
@@ -171,12 +171,14 @@ class ConnectionEquations(Conditioned):
             known: dict[Numbers, Array] = {(): L}
             field = self._jacobians_along(p, directions, end)
             for chosen in numbers[1:]:
-                right: Any = sum(known[u] @ field[v] for u, v in shares(chosen, 2) if u != chosen)
-                for u, v, w in shares(chosen, 3):
+                if alike(same, chosen) in known:
+                    continue
+                right: Any = sum(count * known[u] @ field[v] for count, (u, v) in shares(same, chosen, 2) if u != chosen)
+                for count, (u, v, w) in shares(same, chosen, 3):
                     if chosen not in (u, w):
-                        right = right - known[u] @ field[v] @ Q.T @ known[w]
+                        right = right - count * known[u] @ field[v] @ Q.T @ known[w]
                 known[chosen] = solve(right)
-            found.append(known)
+            found.append({chosen: known[alike(same, chosen)] for chosen in numbers})
         return found
 
     def _subspaces(self, p: Array) -> list[tuple[Array, Array, Callable[[Array], Array]]]:
@@ -211,14 +213,19 @@ class ConnectionEquations(Conditioned):
         return [null_space(Q) if len(Q) else np.eye(self._n) for Q in self._bases]
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
-        """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""
+        """Return the Jacobian at the equilibrium of an end, and its derivatives along subsets of the directions.
+
+        Of subsets that stand for the same directions only the first is there (`contin.core.multilinear.alike`).
+        """
         batch, sizes = self.problem.batch("vector field"), self.scales.states
         place = self._places(p[None])[end]
         moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
         given = np.zeros(1), place, np.empty((0, self._n)), p, batch.columns([])
+        same = classes(directions)
         found = {
             chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, : self._n] * sizes / sizes[:, None]
             for chosen in subsets(len(directions))[1:]
+            if alike(same, chosen) == chosen
         }
         return {(): self._linear_at_ends(p)[end][0], **found}
 
@@ -227,19 +234,20 @@ class ConnectionEquations(Conditioned):
         numbers = subsets(len(directions))
         if not self.problem.saddle_node:
             return dict.fromkeys(numbers, np.empty(0))
-        known = self._fold_vectors(self._jacobians_along(p, directions, 0), numbers)
-        return {chosen: vector[-1:] for chosen, vector in known.items()}
+        same = classes(directions)
+        known = self._fold_vectors(self._jacobians_along(p, directions, 0), same)
+        return {chosen: known[alike(same, chosen)][-1:] for chosen in numbers}
 
-    def _fold_vectors(self, field: dict[Numbers, Array], numbers: Sequence[Numbers]) -> dict[Numbers, Array]:
-        """Return (y, g), shape (n + 1,), with derivatives."""
+    def _fold_vectors(self, field: dict[Numbers, Array], same: Numbers) -> dict[Numbers, Array]:
+        """Return (y, g), shape (n + 1,), with the derivatives that the Jacobian is given with."""
         n, (b, c) = self._n, self._borders
         matrix = np.block([[field[()], b[:, None]], [c[None], np.zeros((1, 1))]])
         known: dict[Numbers, Array] = {}
-        for chosen in numbers:
+        for chosen in field:
             right: Array = np.zeros(n + 1)
             right[n] = not chosen
-            for u, v in shares(chosen, 2):
-                right[:n] -= field[u] @ known[v][:n] if u else 0.0
+            for count, (u, v) in shares(same, chosen, 2):
+                right[:n] -= count * field[u] @ known[v][:n] if u else 0.0
             known[chosen] = np.linalg.solve(matrix, right)
         return known
 

@@ -214,7 +214,8 @@ class _FirstPoint:
 
         def again(number: int) -> Array:
             x, factors, longer = self._beside(number)
-            right = self.system.along(x, [self._rounded(longer * direction) for direction in directions])
+            rounded = {id(direction): self._rounded(longer * direction) for direction in directions}
+            right = self.system.along(x, [rounded[id(direction)] for direction in directions])
             found: Array = factors.solve(self._rounded(np.append(right, 0.0))) / longer ** len(directions)
             return found
 

@@ -5,9 +5,11 @@ Directions are numbered, and a derivative along some of them belongs to a tuple 
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,13 +71,45 @@ def subsets(count: int) -> list[Numbers]:
     return [chosen for size in range(count + 1) for chosen in itertools.combinations(range(count), size)]
 
 
-def shares(numbers: Numbers, parts: int) -> Iterator[tuple[Numbers, ...]]:
-    """Yield all ways to give the directions to the factors of a product (Leibniz's rule).
+def classes(directions: Sequence[Array]) -> Numbers:
+    """Return for each direction the number of the first one that is equal to it.
 
     Examples
     --------
-    >>> list(shares((0, 1), 2))
-    [((0, 1), ()), ((0,), (1,)), ((1,), (0,)), ((), (0, 1))]
+    >>> classes([np.ones(2), np.zeros(2), np.ones(2)])
+    (0, 1, 0)
     """
-    for owners in itertools.product(range(parts), repeat=len(numbers)):
-        yield tuple(tuple(number for number, owner in zip(numbers, owners) if owner == part) for part in range(parts))
+    first: dict[bytes, int] = {}
+    return tuple(first.setdefault(direction.tobytes(), number) for number, direction in enumerate(directions))
+
+
+@functools.cache
+def alike(same: Numbers, chosen: Numbers) -> Numbers:
+    """Return the first numbers that stand for the same directions as those that are chosen; ``same`` is that of `classes`.
+
+    Examples
+    --------
+    >>> alike((0, 1, 0, 0), (1, 2, 3))
+    (0, 1, 2)
+    """
+    left, found = list(range(len(same))), list[int]()
+    for number in chosen:
+        found.append(next(each for each in left if same[each] == same[number]))
+        left.remove(found[-1])
+    return tuple(sorted(found))
+
+
+@functools.cache
+def shares(same: Numbers, chosen: Numbers, parts: int) -> list[tuple[int, tuple[Numbers, ...]]]:
+    """Return the ways to give directions to the factors of a product (Leibniz's rule), each with how often it occurs.
+
+    Examples
+    --------
+    >>> shares((0, 0), (0, 1), 2)
+    [(1, ((0, 1), ())), (2, ((0,), (0,))), (1, ((), (0, 1)))]
+    """
+    found: Counter[tuple[Numbers, ...]] = Counter()
+    for owners in itertools.product(range(parts), repeat=len(chosen)):
+        given = (tuple(number for number, owner in zip(chosen, owners) if owner == part) for part in range(parts))
+        found[tuple(alike(same, each) for each in given)] += 1
+    return [(count, given) for given, count in found.items()]
