@@ -388,15 +388,15 @@ class ConnectionEquations(Conditioned):
 
     def _left_null_vector(self, x: Array, factors: Factors | None) -> Array:
         """Return it from solutions of F_x^T y + m row = e for the user's two parameters, combined so that no row is left."""
-        random = generator(__name__)
         if factors is None:
-            _, factors = self.linearize(x, (random.standard_normal(self.size),))
+            _, factors = self.linearize(x, (generator(__name__).standard_normal(self.size),))
         own = [name for name in self.free if name not in self.problem.multipliers]
         units = np.zeros((2, self.size))
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
-        (*first, one), (*last, other) = factors.solve_transposed(units)
-        w: Array = other * np.array(first) - one * np.array(last)
-        near = random.standard_normal(w.size) if x is self.reference else self.left_null_vector(self.reference, factors)
+        first, last = factors.solve_transposed(units)
+        w: Array = last[-1] * first[:-1] - first[-1] * last[:-1]
+        is_reference = x is self.reference
+        near = generator(__name__).standard_normal(w.size) if is_reference else self.left_null_vector(self.reference, factors)
         return w * (math.copysign(1.0, w @ near) / np.linalg.norm(w))
 
     def slow_motion(self, x: Array) -> tuple[Array, float]:

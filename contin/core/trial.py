@@ -12,6 +12,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array, Numbers
+from contin.core.newton import linearized
 from contin.core.protocol import Discretization, inner
 from contin.linalg.factors import Factors
 from contin.shown import shown
@@ -39,7 +40,10 @@ class Linearization:
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
     """Return the linearization at x, its tangent with row.tangent > 0."""
-    return linearization_of(system, system.linearize(x, (row,))[1])
+    done = linearized(system, x, row)
+    if done is None or done.tangent is None:
+        return linearization_of(system, system.linearize(x, (row,))[1])
+    return Linearization(done.tangent, done.factors.sign, done.factors)
 
 
 def linearization_of(system: Discretization, factors: Factors) -> Linearization:
