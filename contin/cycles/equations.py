@@ -71,7 +71,7 @@ class PeriodicEquations(Collocation):
 
     def _take_mesh(self, mesh: Array) -> None:
         super()._take_mesh(mesh)
-        self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
+        self._known: dict[bytes, tuple[ComplexArray, list[tuple[ComplexArray, Mask]]]] = {}
 
     @property
     def turn(self) -> Array:
@@ -244,7 +244,7 @@ class PeriodicEquations(Collocation):
         That of a pair on the unit circle, to round-off, has the real part zero. With a symmetry of order n they are those of
         the map over one n-th of the period, S^-1 times its monodromy matrix; see `whole_round`.
         """
-        return self._multipliers(x)[0]
+        return self._compared(x)[0]
 
     def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
         """Return the logarithms of the multipliers at several places."""
@@ -252,21 +252,27 @@ class PeriodicEquations(Collocation):
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""
-        return self._multipliers(x)[1]
+        return self._compared(x)[1]
 
     def computed_eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
-        return self._multipliers(x)[2]
+        return self._multipliers(x)[0]
 
-    def _multipliers(self, x: Array) -> tuple[ComplexArray, Mask, ComplexArray]:
-        """Return the logarithms of the multipliers, which lie on the unit circle, and all as computed, once."""
+    def _compared(self, x: Array) -> tuple[ComplexArray, Mask]:
+        """Return the logarithms of the multipliers, and which lie on the unit circle, once."""
+        values, compared = self._multipliers(x)
+        if not compared:  # takes several of them: a zero is located without
+            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
+            compared.append((np.where(neutral & is_pair(values), 1j * values.imag, values), neutral))
+        return compared[0]
+
+    def _multipliers(self, x: Array) -> tuple[ComplexArray, list[tuple[ComplexArray, Mask]]]:
+        """Return the logarithms of the multipliers as computed, once, and what `_compared` keeps of them."""
         key = x.tobytes()
         if key not in self._known:
             if len(self._known) > KEPT:
                 self._known.clear()
-            values = self._computed(x)
-            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
-            self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral, values
+            self._known[key] = self._computed(x), []
         return self._known[key]
 
     @functools.cached_property

@@ -187,7 +187,7 @@ def doubling(order: int = 1) -> Event:
 
 def _antiperiodic(trial: Trial) -> float:
     system: Any = trial.system
-    values = system.eigenvalues(trial.x)
+    values = system.computed_eigenvalues(trial.x)
     with np.errstate(invalid="ignore"):  # NaN where there are none
         size = np.exp(-np.abs(values.real))
         ahead = np.exp(1j * values.imag)
