@@ -229,6 +229,7 @@ class _Search:
         self.system, self.x, self.newton = system, x, newton
         self.beta = 0.0
         self.size, self.before = np.inf, np.inf  # of the last update, and of the one before
+        self._rate_before = 1.0
         self._borders = borders_at(system, x, kernel)
         self._hessian: Array | None = None
         self._slope: Array = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
@@ -265,14 +266,20 @@ class _Search:
     @property
     def converged(self) -> bool:
         """The estimated error is below the tolerance, or the updates are round-off."""
-        rate = min(1.0, max(_LINEAR, self.size / self.before)) if np.isfinite(self.before) else 1.0
-        return self.size * rate <= self.newton.tolerance or (self.size < LOCATED and rate > _SHRINKING)
+        rate = self._rate
+        error = self.size * max(_LINEAR, rate, self._rate_before)  # what Broyden's first update explains is one direction
+        return error <= self.newton.tolerance or (self.size < LOCATED and rate > _SHRINKING)
+
+    @property
+    def _rate(self) -> float:
+        """How much smaller the last update was than the one before; 1 where none was before, and where it was larger."""
+        return min(1.0, self.size / self.before) if np.isfinite(self.before) else 1.0
 
     def prepare(self) -> None:
         """Drop the Hessian where the last update was not much smaller than the one before."""
         if self.size > _LINEAR * self.before:
             self._hessian = None
-        self.before = self.size
+        self._rate_before, self.before = self._rate, self.size
 
     def result(self) -> BranchPoint:
         """Return the branch point: tangents from the algebraic bifurcation equation, the kernel made orthonormal."""

@@ -1,12 +1,13 @@
 """Branch points: where they are, their tangents and kernels, against closed forms."""
 
+import contextlib
 import math
 
 import numpy as np
 import pytest
 from bank.closed_forms import bratu, buckling_loads, elastica, parabola, pitchfork, two_elasticas
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Newton, solve, trace
 from contin.lowlevel import Algebraic, Collocation, MultiplePoint, locate_branch_point
 
 
@@ -88,3 +89,34 @@ def test_branches_that_pass_each_other_at_a_distance_do_not_cross(step):
     problem = AlgebraicProblem(lambda u, p: ((1 - p.load) * u.x - 1.5 * u.x**2 - 0.01 * p.load,), ["x"], {"load": 0.0})
     branch = trace(solve(problem, [0.0]), free=["load"], limits={"load": (-1, 2)}, step=step)
     assert [point.label for point in branch.points[1:] if point.label] == ["LP", "EP"]
+
+
+def random_crossing(seed):
+    """Two curves that cross at the origin, in other coordinates; the random numbers that follow."""
+    random = np.random.default_rng(seed)
+    linear, quadratic = np.eye(3) + 0.4 * random.standard_normal((3, 3)), 0.5 * random.standard_normal((3, 3, 3))
+    bend, mixed = random.standard_normal(2)
+
+    def equations(u, p):
+        v = (u.x, u.y, p.a)
+        w = [
+            sum(linear[i, j] * v[j] for j in range(3))
+            + sum(quadratic[i, j, k] * v[j] * v[k] for j in range(3) for k in range(3))
+            for i in range(3)
+        ]
+        return w[0] * (w[2] - bend * w[0] - w[0] ** 2), w[1] + mixed * w[0] * w[2]
+
+    return Algebraic(AlgebraicProblem(equations, ["x", "y"], {"a": 0.0}), ["a"]), random
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_what_is_left_is_below_the_tolerance_be_it_large(tolerance):
+    """At the origin; other crossings are further away. After one update the next says little of what is left."""
+    left = []
+    for seed in range(60):
+        system, random = random_crossing(seed)
+        with contextlib.suppress(ConvergenceError):
+            found = locate_branch_point(system, 0.03 * random.standard_normal(3), Newton(tolerance))
+            left.append(np.abs(found.x).max())
+    left = [distance for distance in left if distance < 1e-2]
+    assert len(left) > 50 and max(left) < 3 * tolerance
