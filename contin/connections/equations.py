@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -128,8 +129,8 @@ class ConnectionEquations(Conditioned):
         jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
         return jacobian * sizes / sizes[:, None]
 
-    def _linear_at_ends(self, p: Array) -> list[tuple[Array, _Schur]]:
-        """Return the Jacobians at both equilibria, and the Schur forms of their transposes, once for values of all parameters.
+    def _linear_at_ends(self, p: Array) -> list[_Linear]:
+        """Return the linearized fields at both equilibria, once for values of all parameters.
 
         Raises
         ------
@@ -137,13 +138,13 @@ class ConnectionEquations(Conditioned):
             A Jacobian is not finite.
         """
 
-        def made(place: Array) -> tuple[Array, _Schur]:
+        def made(place: Array) -> _Linear:
             jacobian = self._jacobian_at(place[0], p)
             if not np.isfinite(jacobian).all():
                 raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
-            return jacobian, _schur(jacobian.T)
+            return _Linear(jacobian)
 
-        def both() -> list[tuple[Array, _Schur]]:
+        def both() -> list[_Linear]:
             first, last = self._places(p[None])
             known = made(first)
             return [known, known if last is first else made(last)]
@@ -153,7 +154,7 @@ class ConnectionEquations(Conditioned):
     def _left_vectors(self, p: Array) -> list[Array]:
         """Return bases of the spaces of L and L' for values of all parameters, not normalized."""
         ends = enumerate(zip(self._linear_at_ends(p), self.problem.conditions))
-        return [_left_subspace(schur, count, stable=end == 0) for end, ((_, schur), count) in ends]
+        return [_left_subspace(linear.schur, count, stable=end == 0) for end, (linear, count) in ends]
 
     def _subspaces_along(self, p: Array, directions: Sequence[Array]) -> list[dict[Numbers, Array]]:
         """Return L, and then L', with their derivatives along directions of all parameters, for all subsets of the directions.
@@ -200,8 +201,12 @@ class ConnectionEquations(Conditioned):
         return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        (A, schur), Q = self._linear_at_ends(p)[end], self._bases[end]
-        L, N = _normalized(_left_subspace(schur, self.problem.conditions[end], stable=end == 0), Q), self._complements[end]
+        linear, Q = self._linear_at_ends(p)[end], self._bases[end]
+        A = linear.jacobian
+        L, N = (
+            _normalized(_left_subspace(linear.schur, self.problem.conditions[end], stable=end == 0), Q),
+            self._complements[end],
+        )
         made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
         return Q, L, lambda right: made()(-right @ N) @ N.T
 
@@ -227,7 +232,7 @@ class ConnectionEquations(Conditioned):
             for chosen in subsets(len(directions))[1:]
             if alike(same, chosen) == chosen
         }
-        return {(): self._linear_at_ends(p)[end][0], **found}
+        return {(): self._linear_at_ends(p)[end].jacobian, **found}
 
     def _fold_along(self, p: Array, directions: Sequence[Array]) -> dict[Numbers, Array]:
         """Return g, shape (1,), with its derivatives along all subsets of the directions; of a saddle, shape (0,)."""
@@ -372,7 +377,7 @@ class ConnectionEquations(Conditioned):
 
     def saddle_jacobian(self, x: Array) -> Array:
         """Return the derivatives of the field by the states at the first equilibrium, scaled, shape (n, n)."""
-        return self._linear_at_ends(self.all_parameters(x))[0][0]
+        return self._linear_at_ends(self.all_parameters(x))[0].jacobian
 
     def saddle(self, x: Array) -> SaddleSpectrum:
         """Return eigenvalues and eigenvectors at the first equilibrium."""
@@ -430,7 +435,7 @@ class ConnectionEquations(Conditioned):
         for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
             if not len(L):
                 continue
-            A, L, N = self._linear_at_ends(p)[end][0], _normalized(L, self._bases[end]), null_space(L)
+            A, L, N = self._linear_at_ends(p)[end].jacobian, _normalized(L, self._bases[end]), null_space(L)
             K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
             bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
             H = solve_sylvester(-M, np.kron(K, unit) + np.kron(unit, K), bent)
@@ -504,6 +509,18 @@ def _spectrum(jacobian: Array) -> SaddleSpectrum:
     values, vectors = np.linalg.eig(jacobian)
     order = np.argsort(-values.real)
     return SaddleSpectrum(values[order].astype(complex), vectors[:, order].astype(complex))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Linear:
+    """The Jacobian at an equilibrium, and the Schur form of its transpose, made when first needed."""
+
+    jacobian: Array
+
+    @functools.cached_property
+    def schur(self) -> _Schur:
+        """v t v^T with orthogonal v and quasi-triangular t."""
+        return _schur(self.jacobian.T)
 
 
 class _Schur(NamedTuple):

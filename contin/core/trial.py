@@ -139,7 +139,9 @@ class Trial:
 
     def refactor(self, row: Array) -> None:
         """Take the factors anew, bordered by ``row``; tangent and sign stay."""
-        self._linear = dataclasses.replace(self.linear, factors=self.system.linearize(self.x, (row,))[1])
+        done = linearized(self.system, self.x, row)
+        factors = self.system.linearize(self.x, (row,))[1] if done is None else done.factors
+        self._linear = dataclasses.replace(self.linear, factors=factors)
 
     def value(self, test: Event) -> float:
         """Return the value of a test function, computed once: a point that two steps share has one value for both."""
