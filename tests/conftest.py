@@ -18,17 +18,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parent.parent
-#: The modules that take longest, some ten seconds or more, in order. They are handed out first: what comes last must be short,
+#: The modules that take longest, some six seconds or more, in order. They are handed out first: what comes last must be short,
 #: or one worker ends long before the other.
 FIRST = (
-    "branches/test_diagram", "branches/test_run", "branches/test_explore", "contin/continuation/test_sizes",
-    "branches/test_solid", "branches/test_stability", "branches/test_at_value", "contin/functions/test_cache",
-    "ribbon_model/test_exact_rods", "ribbon_model/test_descent", "ribbon_model/test_finite_width", "branches/test_open",
-    "ribbon_model/test_stability",
-    "contin/connections/test_grown_orbits", "branches/test_open_accuracy", "contin/discretization/test_switches",
-    "contin/detection/test_random_equilibria", "contin/detection/test_hopf", "ribbon_model/test_exact", "branches/test_paper",
-    "contin/continuation/test_repeatable", "contin/continuation/test_bank", "ribbon_model/test_phases", "branches/test_cli",
-    "test_torture", "branches/test_shell", "branches/test_strip", "test_docs",
+    "branches/test_network", "branches/test_explore", "branches/test_scene", "contin/search/test_further",
+    "ribbon_model/test_network", "branches/test_pictures", "branches/test_further_closed", "branches/test_at_value",
+    "branches/test_diagram", "branches/test_run", "contin/boundary/test_oscillating", "ribbon_model/test_network_random",
+    "test_docs", "branches/test_further", "ribbon_model/test_network_segments", "branches/test_open",
+    "contin/equilibria/test_solver", "contin/boundary/test_fields", "branches/test_interrupt", "ribbon_model/test_exact",
+    "contin/events/test_random_equilibria", "ribbon_model/test_network_index", "contin/functions/test_cache",
+    "branches/test_solid", "contin/search/test_many", "branches/test_sentences", "contin/collocation/test_switches",
+    "ribbon_model/test_network_loop", "contin/continuation/test_bank", "contin/continuation/test_sizes",
+    "ribbon_model/test_examples", "branches/test_cli", "ribbon_model/test_phases", "test_torture",
 )  # fmt: skip
 #: Each worker imports everything and needs up to a gigabyte.
 MOST_WORKERS = 8
@@ -91,6 +92,7 @@ def pytest_collection_modifyitems(config, items):
         elif zlib.crc32(item.nodeid.encode()) % parts != part:
             item.add_marker(pytest.mark.skip(reason="takes long, and belongs to another part of those that do"))
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
+    assert all(path.exists() for path in places), "FIRST names a module that is not there"
     items.sort(key=lambda item: places.get(item.path, len(places)))
 
 

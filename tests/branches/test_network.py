@@ -152,7 +152,7 @@ def test_the_determinant_vanishes_where_a_bigon_buckles(shipped):
         assert np.abs(shooting.missed(both)).max() < 1e-10
         return np.linalg.det(shooting.slopes(bases, x, 1e-5))
 
-    assert brentq(determinant, buckling - 0.05, buckling + 0.05, xtol=1e-9) == pytest.approx(buckling, abs=3e-8)
+    assert brentq(determinant, buckling - 1e-3, buckling + 1e-3, xtol=1e-9) == pytest.approx(buckling, abs=3e-8)
 
 
 def test_a_closed_strip_with_a_phase(shipped):
@@ -419,7 +419,7 @@ def test_the_barrier_of_a_buckled_column(run, monkeypatch):
     assert head == "to leave stable states:" and line.startswith("  P = 85 of stage ")
 
 
-def test_the_snap_of_an_arch(run, root, shipped):
+def test_the_snap_of_an_arch(run, root, shipped, monkeypatch):
     """Past its fold it falls to the other side: the energy is that of an arch that is drawn there, without the segments."""
     branch = read_branch(shipped("network_arch"))
     (fall,) = falls(branch)
@@ -436,6 +436,7 @@ def test_the_snap_of_an_arch(run, root, shipped):
     below = run(text).points[-1]
     assert below["index"] == 0
     assert fall.released == pytest.approx(start - below["potential"], abs=5e-4)
+    monkeypatch.setattr("branches.run.barriers.falls", lambda *given: [fall])  # computed already
     line = report(branch)[-1]
     assert re.fullmatch(
         r"  P = 14\.1498 of stage 1, point 17: falls into a state that is not in the result, which releases 1\.762\d*", line

@@ -9,6 +9,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 import contin
+from branches import secondary
 from branches.explore import __main__ as page
 from branches.explore.gather import gather
 from branches.export import __main__ as export
@@ -171,18 +172,18 @@ def test_a_film_of_an_open_strip(tip, tmp_path):
     assert (tmp_path / "tip.gif").read_bytes().startswith(b"GIF89a")
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize(
-    "words, sentence",
+    "main, words, sentence",
     [
-        (["branches.secondary", "FILE"], "holds no branch with its index on the cell"),
-        (["branches.graph", "SCENE"], "no exact solution"),
-        (["branches.export", "FILE", "--point", "LP", "--out", "tip.csv"], "1 (EP at force_width = 0.0000 of stage 1)"),
+        (secondary.main, ["FILE"], "holds no branch with its index on the cell"),
+        (graph.main, ["SCENE"], "no exact solution"),
+        (export.main, ["FILE", "--point", "LP", "--out", "tip.csv"], "1 (EP at force_width = 0.0000 of stage 1)"),
     ],
+    ids=["secondary", "graph", "export"],
 )
-def test_what_other_commands_say(tip, root, command, words, sentence):
+def test_what_other_commands_say(tip, root, call, main, words, sentence):
     places = {"FILE": tip, "SCENE": root / "configs" / "open_tip.yaml"}
-    done = command(*[places.get(word, word) for word in words[1:]], program=("-m", words[0]))
+    done = call(main, *[places.get(word, word) for word in words])
     assert done.returncode == 2 and sentence in done.err and done.err.count("\n") == 1
 
 
