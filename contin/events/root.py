@@ -20,6 +20,8 @@ _IDLE = 1e3
 #: Values scatter, which is round-off, where the bracket closes to this part, in so many evaluations or more, and the larger one
 #: at its ends is not half as small: even with the slope of a cube root it is, where the bracket closes to an eighth.
 _NOISY, _OFTEN = 1e-2, 4
+#: Values of which the smaller one is more than this part of the larger one are alike: round-off gives both.
+_ALIKE = 0.01
 #: A value where the bracket closes is no zero if it is above this part of the larger one at its first ends: the function jumps.
 #: At a zero with an infinite slope, as of a square root, it is 1e-6 of them.
 _JUMP = 1e-3
@@ -73,9 +75,7 @@ def find_zero(
         if abs(b - a) < closed and min(abs(beyond), abs(fb)) > small:
             break
         known = [*known[-2:], (c, fc)]
-        following = _interpolated(known)
-        if following is None:
-            following = _secant((a, fa), (b, fb))
+        following = _interpolated(known, _secant((a, fa), (b, fb)))
         move = abs(following - c)
         if move < _IDLE * tolerance and level <= abs(fc) <= small:
             c = (a + b) / 2  # it is as small all along one side, and jumps somewhere
@@ -83,11 +83,12 @@ def find_zero(
         if move <= tolerance and abs(fc) <= small:
             return c
         idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
-        best, closed_to = min(best, (abs(fc), c)), course.closed_to(abs(b - a), max(abs(beyond), abs(fb)))
-        if best[0] <= small and (idle == 2 or closed_to < _NOISY):
+        best = min(best, (abs(fc), c))
+        course.go_on(abs(b - a), *sorted((abs(beyond), abs(fb))))
+        if best[0] <= small and (idle == 2 or course.scatters):
             return best[1]
         # It stands still as for an exponential function seen from where that is flat.
-        c = (a + b) / 2 if closed_to > 0.5 and move > _IDLE * tolerance and abs(fc) > least / 2 else following
+        c = (a + b) / 2 if course.closed_to > 0.5 and move > _IDLE * tolerance and abs(fc) > least / 2 else following
     if best[0] <= CORRECTED * small:  # a zero of a higher order, to which values fall slowly
         return best[1]
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
@@ -108,24 +109,34 @@ def _secant(one: Value, other: Value) -> float:
 
 
 class _Course:
-    """How a bracket closes, while the larger value at its ends does not become half as small."""
+    """How a bracket closes, while the larger value at its ends does not become half as small.
+
+    Attributes
+    ----------
+    closed_to : float
+        Part to which it has closed since; NaN where that is not long ago.
+    scatters : bool
+        Values are round-off: the bracket closes, and they are alike at both ends, where a jump may have a flat side.
+    """
 
     def __init__(self, width: float, value: float) -> None:
         self._width, self._value, self._often = width, value, 0
+        self.closed_to, self.scatters = math.nan, False
 
-    def closed_to(self, width: float, value: float) -> float:
-        """Return to which part it has closed since the value was last half as small; NaN where that is not long ago."""
+    def go_on(self, width: float, smaller: float, larger: float) -> None:
+        """Take the next bracket."""
         self._often += 1
-        if value < self._value / 2:
-            self._width, self._value, self._often = width, value, 0
-        return width / self._width if self._often >= _OFTEN else math.nan
+        if larger < self._value / 2:
+            self._width, self._value, self._often = width, larger, 0
+        self.closed_to = width / self._width if self._often >= _OFTEN else math.nan
+        self.scatters = self.closed_to < _NOISY and smaller > _ALIKE * larger
 
 
-def _interpolated(known: list[Value]) -> float | None:
-    """Return where the parabola through three places, as a function of the value, has value zero; None without one."""
+def _interpolated(known: list[Value], otherwise: float) -> float:
+    """Return where the parabola through three places, as a function of the value, has value zero."""
     (x, fx), (y, fy), (z, fz) = known
     if fx == fy or fy == fz or fz == fx:
-        return None
+        return otherwise
     size = -math.frexp(max(abs(fx), abs(fy), abs(fz)))[1]  # with the largest of order one, no product below is zero or infinite
     fx, fy, fz = (math.ldexp(value, size) for value in (fx, fy, fz))
     return x * fy * fz / ((fx - fy) * (fx - fz)) + y * fx * fz / ((fy - fx) * (fy - fz)) + z * fx * fy / ((fz - fx) * (fz - fy))
