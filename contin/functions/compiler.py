@@ -10,7 +10,6 @@ import functools
 import gc
 import inspect
 import itertools
-import operator
 import types as python_types
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -22,10 +21,12 @@ from llvmlite import ir
 from numba.core import cgutils, compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.datamodel.models import ArrayModel
+from numba.core.funcdesc import default_mangler
 from numba.core.registry import cpu_target
+from numba.core.targetconfig import ConfigStack
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import Signature
-from numba.np.arrayobj import populate_array
 
 from contin.functions.kernel_parts import Helper, Instruction, Place, kernel_of, names_in
 from contin.functions.machine_code import INNER, Code, machine
@@ -87,11 +88,11 @@ class _Passes(compiler.Compiler):
 
 
 #: Passes that look for expressions of arrays, closures, `with` and other things that kernels have not. Without them kernels are
-#: the same, and compiled in 19 of 20 parts of the time.
+#: the same, and compiled in nine tenths of the time.
 _SKIPPED = (
-    "WithLifting", "RewriteSemanticConstants", "DeadBranchPrune", "MakeFunctionToJitFunction", "FindLiterallyCalls",
-    "LiteralUnroll", "LiteralPropagationSubPipelinePass", "InlineOverloads", "NopythonRewrites", "AnnotateTypes",
-    "NoPythonSupportedFeatureValidation",
+    "IRProcessing", "WithLifting", "InlineClosureLikes", "RewriteSemanticConstants", "DeadBranchPrune",
+    "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "LiteralPropagationSubPipelinePass", "InlineOverloads",
+    "NopythonRewrites", "AnnotateTypes", "NoPythonSupportedFeatureValidation",
 )  # fmt: skip
 
 
@@ -121,12 +122,16 @@ def _own_options(codegen: Any) -> Iterator[None]:
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
     functions: Any = types.BaseFunction
+    context, models = cpu_target.target_context, cpu_target.target_context.data_model_manager
     codegen._library_class, codegen._tm, functions.get_call_type = _Library, _target(), _resolved
+    context.data_model_manager, context.mangler = _models(), _named
     gc.disable()
     try:
         yield
     finally:
         codegen._library_class, codegen._tm, functions.get_call_type = libraries, target, _RESOLVE
+        context.data_model_manager = models
+        del context.mangler
         gc.freeze()
         if collects:
             gc.enable()
@@ -139,14 +144,14 @@ _RESOLVED: dict[Any, Any] = {}
 
 
 def _resolved(function: Any, context: Any, arguments: Any, names: Any) -> Any:
-    """Return what `_RESOLVE` finds, which is asked once for each operator: kernels are compiled in nine tenths of the time.
+    """Return what `_RESOLVE` finds, which is asked once for a function, types, and options of who calls.
 
-    There are thousands of sums of two whole numbers, and for each numba tries all that it knows of sums. Of other functions it
-    makes versions for the options of who calls them.
+    There are thousands of sums of two whole numbers, and for each numba tries all that it knows of sums.
     """
-    if getattr(function.typing_key, "__module__", None) != operator.add.__module__:
+    if names:
         return _RESOLVE(function, context, arguments, names)
-    key = function, tuple(arguments)
+    options: Any = ConfigStack.top_or_none()
+    key = function, tuple(arguments), bool(options.fastmath)
     if key not in _RESOLVED:
         _RESOLVED[key] = _RESOLVE(function, context, arguments, names)
     return _RESOLVED[key]
@@ -159,8 +164,57 @@ def _target() -> Any:
     return llvm.Target.from_triple(triple).create_target_machine(cpu=processor, opt=3, reloc="pic", codemodel="default")
 
 
+class _Array(ArrayModel):
+    """Arrays as numba has them, passed to functions as address and shape; where these are not contiguous, with strides.
+
+    numba passes nine numbers for a matrix. A function takes each field of a named tuple as an argument, and some of these have
+    more than a hundred.
+    """
+
+    def get_argument_type(self) -> Any:
+        """Return LLVM's types of what is passed of an array."""
+        data, shape, strides = (self._models[self.get_field_position(name)] for name in ("data", "shape", "strides"))
+        passed = [data, shape] if self._fe_type.layout == "C" else [data, shape, strides]
+        return tuple(model.get_argument_type() for model in passed)
+
+    def as_argument(self, builder: ir.IRBuilder, value: ir.Value) -> Any:
+        """Return what is passed of an array."""
+        data, shape, *strides = super().as_argument(builder, value)[4:]
+        return (data, shape) if self._fe_type.layout == "C" else (data, shape, *strides)
+
+    def from_argument(self, builder: ir.IRBuilder, value: Any) -> Any:
+        """Return the array."""
+        data, shape, *strides = value
+        size = ir.Constant(_WORD, self._fe_type.dtype.bitwidth // 8)
+        *steps, _ = itertools.accumulate([size, *reversed(shape)], builder.mul)
+        count = functools.reduce(builder.mul, shape)
+        owner = [ir.Constant(model.get_value_type(), None) for model in self._models[:2]]
+        return super().from_argument(builder, (*owner, count, size, data, shape, *(strides or [steps[::-1]])))
+
+
+def _named(name: str, types: Any, *, abi_tags: Any = (), uid: int | None = None) -> Any:
+    """Return the name of a function in LLVM's language, with its number. Types of its arguments are thousands of letters."""
+    return default_mangler(name, (), uid=uid)
+
+
+@functools.cache
+def _models() -> Any:
+    """Return how values of numba's types are kept and passed."""
+    models = cpu_target.target_context.data_model_manager.copy()
+    models.register(types.Array, _Array)
+    return models
+
+
 class _Library(JITCodeLibrary):
     """A module that numba makes. It is not optimized with all that it calls before that is part of a kernel."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Optimize each function."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         """Do nothing."""
@@ -352,7 +406,7 @@ class _Entry:
         self.module = ir.Module(name)
         self.module.triple, self.module.data_layout = llvm.get_default_triple(), context.codegen()._data_layout
         self.function = ir.Function(self.module, ir.FunctionType(_POINTER, [_POINTER, _POINTER.as_pointer(), _WORD]), name)
-        self.builder = ir.IRBuilder(self.function.append_basic_block())
+        self.builder, self.shape = ir.IRBuilder(self.function.append_basic_block()), self._shape()
         self.wrong = self.function.append_basic_block("wrong")
         self.failed = self.function.append_basic_block("failed")
 
@@ -381,14 +435,15 @@ class _Entry:
     def _write(self) -> None:
         builder, conventions, described = self.builder, self.context.call_conv, self.done.fndesc
         _, arguments, count = self.function.args
-        self._require(_equal(builder, count, len(self.parameters)))
-        values = [self._value(hint, builder.load(_step(builder, arguments, i))) for i, hint in enumerate(self.parameters)]
+        self._require(builder.icmp_signed("==", count, ir.Constant(_WORD, len(self.parameters))), self.wrong)
+        values = [self._values(hint, builder.load(_step(builder, arguments, i))) for i, hint in enumerate(self.parameters)]
         kind = conventions.get_function_type(described.restype, described.argtypes)
         kernel = ir.Function(self.module, kind, described.llvm_func_name)
+        places = [builder.alloca(argument.type.pointee) for argument in kernel.args[:2]]  # of the result, and an error
         thread = self._call("PyEval_SaveThread", _POINTER)
-        _, result = conventions.call_function(builder, kernel, described.restype, described.argtypes, values)
+        builder.call(kernel, [*places, *itertools.chain.from_iterable(values)])
         self._call("PyEval_RestoreThread", ir.VoidType(), thread)
-        builder.ret(self._result(described.restype, result))
+        builder.ret(self._result(described.restype, builder.load(places[0])))
         builder.position_at_end(self.wrong)
         text = cgutils.global_constant(builder.module, "wrong", cgutils.make_bytearray(_WRONG_ARGUMENTS))
         self._call("PyErr_SetString", ir.VoidType(), self._own(_WRONG), builder.bitcast(text, _POINTER))
@@ -396,43 +451,48 @@ class _Entry:
         builder.position_at_end(self.failed)
         builder.ret(ir.Constant(_POINTER, None))
 
-    def _value(self, hint: object, given: ir.Value) -> Any:
-        """Return what the compiled function takes for a Python object."""
+    def _values(self, hint: object, given: ir.Value) -> list[ir.Value]:
+        """Return what the compiled function takes for a Python object: numbers, and of arrays address and shape."""
         builder, kind = self.builder, _type(hint)
         if isinstance(kind, types.Array):
-            return self._array(kind, given)
+            flags = _CONTIGUOUS | (_WRITABLE if kind.mutable else 0)
+            wanted = [ir.Constant(_INT, value) for value in (kind.ndim, flags, np.dtype(str(kind.dtype)).num)]
+            shape = builder.call(self.shape, [given, self._own(_ARRAY), *wanted])
+            self._require(builder.icmp_unsigned("!=", shape, ir.Constant(_WORDS, None)), self.wrong)
+            data = _field(builder, given, _DATA, self.context.get_data_type(kind.dtype).as_pointer())
+            return [data, *(builder.load(_step(builder, shape, i)) for i in range(kind.ndim))]
         if isinstance(kind, types.BaseTuple):
             entries = self._entries(given)
-            values = [self._value(field, builder.load(_step(builder, entries, i))) for i, field in enumerate(_fields(hint))]
-            return self.context.make_tuple(builder, kind, values)
+            fields = [self._values(field, builder.load(_step(builder, entries, i))) for i, field in enumerate(_fields(hint))]
+            return list(itertools.chain.from_iterable(fields))
         whole = isinstance(kind, types.Integer)
         value = self._call("PyLong_AsLongLong", _WORD, given) if whole else self._call("PyFloat_AsDouble", _DOUBLE, given)
-        error = builder.icmp_unsigned("!=", self._call("PyErr_Occurred", _POINTER), ir.Constant(_POINTER, None))
-        follows = self.function.append_basic_block()
-        builder.cbranch(error, self.failed, follows)
-        builder.position_at_end(follows)
-        return value
+        error = self._call("PyErr_Occurred", _POINTER)
+        self._require(builder.icmp_unsigned("==", error, ir.Constant(_POINTER, None)), self.failed)
+        return [value]
 
-    def _array(self, kind: types.Array, given: ir.Value) -> Any:
-        """Return an array's address and shape as numba has them."""
-        builder, dtype = self.builder, np.dtype(str(kind.dtype))
-        self._require(builder.icmp_unsigned("==", _field(builder, given, _TYPE, _POINTER), self._own(_ARRAY)))
-        self._require(_equal(builder, _field(builder, given, _DIMENSIONS, _INT), kind.ndim))
-        flags = _CONTIGUOUS | (_WRITABLE if kind.mutable else 0)
-        self._require(_equal(builder, builder.and_(_field(builder, given, _FLAGS, _INT), ir.Constant(_INT, flags)), flags))
+    def _shape(self) -> Any:
+        """Write the function that returns the address of an array's shape; null where it is not of the wanted kind.
+
+        int64 *shape(PyObject *given, PyObject *ndarray, int dimensions, int flags, int number)
+        """
+        kind = ir.FunctionType(_WORDS, [_POINTER, _POINTER, _INT, _INT, _INT])
+        function = ir.Function(self.module, kind, "shape")
+        given, array, dimensions, flags, number = function.args
+        builder = ir.IRBuilder(function.append_basic_block())
+        none = ir.Constant(_WORDS, None)
+        with builder.if_then(builder.icmp_unsigned("!=", _field(builder, given, _TYPE, _POINTER), array)):
+            builder.ret(none)
         numbers = _field(builder, given, _NUMBERS, _POINTER)
-        self._require(_equal(builder, _field(builder, numbers, _NUMBER, _INT), dtype.num))
-        self._require(_equal(builder, _field(builder, numbers, _ORDER, _BYTE), ord("=")))
-        extents = _field(builder, given, _SHAPE, _WORDS)
-        shape = [builder.load(_step(builder, extents, i)) for i in range(kind.ndim)]
-        size = ir.Constant(_WORD, dtype.itemsize)
-        strides = [size]
-        for extent in reversed(shape[1:]):
-            strides.insert(0, builder.mul(strides[0], extent))
-        array = self.context.make_array(kind)(self.context, builder)
-        data = builder.bitcast(_field(builder, given, _DATA, _POINTER), array.data.type)
-        populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
-        return array._getvalue()
+        pairs = [
+            (_field(builder, given, _DIMENSIONS, _INT), dimensions),
+            (builder.and_(_field(builder, given, _FLAGS, _INT), flags), flags),
+            (_field(builder, numbers, _NUMBER, _INT), number),
+            (_field(builder, numbers, _ORDER, _BYTE), ir.Constant(_BYTE, ord("="))),
+        ]
+        fits = functools.reduce(builder.and_, (builder.icmp_unsigned("==", *pair) for pair in pairs))
+        builder.ret(builder.select(fits, _field(builder, given, _SHAPE, _WORDS), none))
+        return function
 
     def _result(self, kind: types.Type, value: ir.Value) -> Any:
         """Return a result as a Python object."""
@@ -453,10 +513,10 @@ class _Entry:
         size = _field(builder, _field(builder, given, _TYPE, _POINTER), _BASIC_SIZE, _WORD)
         return builder.bitcast(builder.gep(given, [size]), _POINTER.as_pointer())
 
-    def _require(self, condition: ir.Value) -> None:
-        """Go on where a condition holds."""
+    def _require(self, condition: ir.Value, otherwise: Any) -> None:
+        """Go on where a condition holds, else in another block."""
         follows = self.function.append_basic_block()
-        self.builder.cbranch(condition, follows, self.wrong)
+        self.builder.cbranch(condition, follows, otherwise)
         self.builder.position_at_end(follows)
 
     def _call(self, name: str, returned: ir.Type, *arguments: ir.Value) -> Any:
@@ -472,7 +532,8 @@ def _linked(library: JITCodeLibrary) -> Any:
     for function in library._final_module.functions:
         if _instructions(function) > _LONG:
             function.add_function_attribute("noinline")  # it stands in the machine code once
-    JITCodeLibrary._optimize_final_module(library)
+    passes, builder = library._codegen._module_pass_manager()
+    passes.run(library._final_module, builder)
     return library._final_module
 
 
@@ -502,8 +563,3 @@ def _step(builder: ir.IRBuilder, pointer: ir.Value, count: int) -> Any:
 def _field(builder: ir.IRBuilder, item: ir.Value, offset: int, kind: ir.Type) -> Any:
     """Return the field of this type at an offset in bytes."""
     return builder.load(builder.bitcast(_step(builder, item, offset), kind.as_pointer()))
-
-
-def _equal(builder: ir.IRBuilder, value: ir.Value, number: int) -> Any:
-    """Return whether a value is a number."""
-    return builder.icmp_signed("==", value, ir.Constant(value.type, number))
