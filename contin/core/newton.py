@@ -153,30 +153,19 @@ def correct(
     return _newton(system, guess, row, target, newton, sizes) if done is None else done
 
 
-def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
-    """Return a solution x as it is, with factors of [F_x; row] and the tangent right there, from one call.
-
-    None where a kernel does not know the equations, or where they are not finite.
-    """
-    work = getattr(system, "workspace", None)
-    with contextlib.suppress(ConvergenceError):
-        return None if work is None else _in_one_call(system, work, x, row, 0.0, None, linearize=True)
-    return None
-
-
 def _in_one_call(
     system: Any,
     work: Workspace,
     guess: Sequence[float] | Array,
     row: Array | None,
     target: float | Array,
-    newton: Newton | None,
+    newton: Newton,
     linearize: bool = False,
     near: Factorization | None = None,
 ) -> Corrected | None:
     """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given.
 
-    None where Python must decide whether updates are round-off. Without ``newton`` the guess is a solution.
+    None where Python must decide whether updates are round-off.
 
     Raises
     ------
@@ -188,10 +177,9 @@ def _in_one_call(
     own = system.fill_conditions(values)
     if row is not None:
         values.rows[own], values.targets[own] = row, target
-    tolerance, most = (newton.tolerance, newton.max_iterations) if newton else (0.0, 0)
-    x, report = np.array(guess, dtype=float), np.zeros(UPDATES + max(most, CHORDS))
+    x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
     factors = system.unfilled_factors() if near is None else near
-    tangent, control = np.empty(x.size), Control(tolerance, most, near is not None, linearize)
+    tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
     done = correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
     iterations, error = int(report[ITERATIONS]), float(report[ERROR])
     if near is None:

@@ -12,7 +12,6 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array, Numbers
-from contin.core.newton import linearized
 from contin.core.protocol import Discretization, inner
 from contin.linalg.factors import Factors
 from contin.shown import shown
@@ -40,10 +39,7 @@ class Linearization:
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
     """Return the linearization at x, its tangent with row.tangent > 0."""
-    done = linearized(system, x, row)
-    if done is None or done.tangent is None:
-        return linearization_of(system, system.linearize(x, (row,))[1])
-    return Linearization(done.tangent, done.factors.sign, done.factors)
+    return linearization_of(system, system.linearize(x, (row,))[1])
 
 
 def linearization_of(system: Discretization, factors: Factors) -> Linearization:
@@ -139,9 +135,7 @@ class Trial:
 
     def refactor(self, row: Array) -> None:
         """Take the factors anew, bordered by ``row``; tangent and sign stay."""
-        done = linearized(self.system, self.x, row)
-        factors = self.system.linearize(self.x, (row,))[1] if done is None else done.factors
-        self._linear = dataclasses.replace(self.linear, factors=factors)
+        self._linear = dataclasses.replace(self.linear, factors=self.system.linearize(self.x, (row,))[1])
 
     def value(self, test: Event) -> float:
         """Return the value of a test function, computed once: a point that two steps share has one value for both."""
