@@ -392,14 +392,16 @@ class ConnectionEquations(Conditioned):
         return self._once("left", x, lambda: self._left_null_vector(x, factors))
 
     def _left_null_vector(self, x: Array, factors: Factors | None) -> Array:
-        """Return it from solutions of F_x^T y + m row = e for the user's two parameters, combined so that no row is left."""
+        """Return it from solutions of F_x^T y + rows^T m = e for the user's parameters, combined so that no row is left."""
+        rows = self.size - self.equations
         if factors is None:
-            _, factors = self.linearize(x, (generator(__name__).standard_normal(self.size),))
+            _, factors = self.linearize(x, generator(__name__).standard_normal((rows, self.size)))
         own = [name for name in self.free if name not in self.problem.multipliers]
-        units = np.zeros((2, self.size))
+        units = np.zeros((len(own), self.size))
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
-        first, last = factors.solve_transposed(units)
-        w: Array = last[-1] * first[:-1] - first[-1] * last[:-1]
+        found = factors.solve_transposed(units)
+        left = np.linalg.svd(found[:, self.equations :])[0][:, -1]
+        w: Array = left @ found[:, : self.equations]
         is_reference = x is self.reference
         near = generator(__name__).standard_normal(w.size) if is_reference else self.left_null_vector(self.reference, factors)
         return w * (math.copysign(1.0, w @ near) / np.linalg.norm(w))
