@@ -241,7 +241,7 @@ def _orbit_flip(side: int) -> Event:
     def component(trial: Trial) -> float:
         system, x = _system(trial), trial.x
         gap = system.apart(x)[1 - side]
-        if not np.linalg.norm(gap) > DOUBLED * np.max(np.abs(x[: system.state_size])):
+        if not np.linalg.norm(gap) > LOCATED * np.max(np.abs(x[: system.state_size])):  # it has no direction
             return float("nan")
         return _component(_leading_vectors(trial, side)[1], gap)
 
