@@ -201,12 +201,8 @@ class ConnectionEquations(Conditioned):
         return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        linear, Q = self._linear_at_ends(p)[end], self._bases[end]
-        A = linear.jacobian
-        L, N = (
-            _normalized(_left_subspace(linear.schur, self.problem.conditions[end], stable=end == 0), Q),
-            self._complements[end],
-        )
+        linear, Q, N = self._linear_at_ends(p)[end], self._bases[end], self._complements[end]
+        A, L = linear.jacobian, _normalized(_left_subspace(linear.schur, self.problem.conditions[end], stable=end == 0), Q)
         made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
         return Q, L, lambda right: made()(-right @ N) @ N.T
 

@@ -95,7 +95,7 @@ def scaled(
 class _Mode:
     """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order.
 
-    It is ``pure`` if nothing but round-off is left in it of other eigenvectors.
+    It is ``pure`` if no more than a part `APART` of any state is left in it of other eigenvectors.
     """
 
     vector: Array
