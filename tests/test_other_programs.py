@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import same
 
 DOCS = Path(__file__).parent.parent / "docs"
-#: Words and numbers of an output; numbers are compared, words are equal.
-NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 BLOCK = re.compile(r'^```(\w+)(?: title="(.*?)")?\n(.*?)^```', re.M | re.S)
 #: Outputs of contin have ten digits and more; columns such as largest values, which are not what is located, hold to 1e-9.
 CONTIN = 1e-9
@@ -23,12 +22,6 @@ AUTO = 1e-5
 def blocks(page):
     """Return the blocks of a page: language, title and text."""
     return BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
-
-
-def same(said, stated, tolerance):
-    assert NUMBER.sub("#", said).split() == NUMBER.sub("#", stated).split(), said
-    found, wanted = (np.array([float(number) for number in NUMBER.findall(text)]) for text in (said, stated))
-    assert np.all(np.abs(found - wanted) <= tolerance * (1 + np.abs(wanted))), said
 
 
 def run(code, scope):
@@ -44,7 +37,8 @@ def test_contin_prints_what_the_page_shows(page):
     pairs = [(code, shown) for (language, _, code), (_, _, shown) in zip(found, found[1:]) if language == "python"]
     assert pairs
     for code, shown in pairs:
-        same(run(code, scope), shown, CONTIN)
+        said = run(code, scope)
+        assert same(said, shown, CONTIN), said
 
 
 @pytest.mark.skipif(
@@ -65,11 +59,12 @@ def test_auto_prints_what_the_page_shows(tmp_path, monkeypatch):
             if re.match(r" +\d+ +\d+ +[A-Z]{2}", line)
         )
 
-    same(rows(done.stdout), rows(texts["AUTO's output"]), AUTO)
+    assert same(rows(done.stdout), rows(texts["AUTO's output"]), AUTO), done.stdout
     scope = {}
     run(next(code for language, _, code in found if language == "python"), scope)
     monkeypatch.chdir(tmp_path)
-    same(run(texts["in AUTO's folder"], scope), next(text for _, title, text in found if title == "its output"), AUTO)
+    said = run(texts["in AUTO's folder"], scope)
+    assert same(said, next(text for _, title, text in found if title == "its output"), AUTO), said
 
 
 @pytest.mark.skipif(not shutil.which("xppaut"), reason="needs XPPAUT: apt-get install xppaut")

@@ -1,11 +1,10 @@
 """The examples in docstrings of ribbon_model give what they say."""
 
-import doctest
 import importlib
 import pkgutil
 
-import numpy as np
 import pytest
+from printed import check_examples
 
 import ribbon_model
 
@@ -16,5 +15,4 @@ MODULES = sorted(module.name for module in pkgutil.iter_modules(ribbon_model.__p
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.full] * (name in LONG)) for name in MODULES])
 def test_examples(name):
-    module = importlib.import_module(f"ribbon_model.{name}")
-    assert doctest.testmod(module, extraglobs={"np": np}).failed == 0
+    check_examples(importlib.import_module(f"ribbon_model.{name}"))
