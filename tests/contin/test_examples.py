@@ -5,7 +5,6 @@ import inspect
 import pkgutil
 import types
 
-import numpy as np
 import pytest
 from printed import UpToRoundOff, check_examples
 
