@@ -54,14 +54,14 @@ class HopfCurve(CriticalCurve):
         return self.frequency(x)
 
     def frequency(self, x: Array) -> float:
-        """Return the frequency; 0 at a neutral saddle."""
-        return math.sqrt(max(self.kappa(x), 0.0))
+        """Return the frequency; 0 at a neutral saddle and where it is not known from 0, as at a Bogdanov-Takens point."""
+        kappa = self.kappa(x)
+        return math.sqrt(kappa) if kappa > DEPENDENT * self.kappa_size else 0.0
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the first Lyapunov coefficient; NaN at Bogdanov-Takens points and neutral saddles."""
-        if self.kappa(x) <= DEPENDENT * self.kappa_size:
-            return UNKNOWN
-        return coefficient(self.base, self.inside(x), pair, self.imaginary_part(x))
+        frequency = self.frequency(x)
+        return coefficient(self.base, self.inside(x), pair, frequency) if frequency else UNKNOWN
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, the frequency, and the first Lyapunov coefficient."""

@@ -1,5 +1,6 @@
 """Branches that begin at any point of a curve in two parameters, compared with those from the labelled point of a branch."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -47,15 +48,21 @@ def test_free_parameters_of_the_cycles():
 
 
 def test_where_no_cycles_begin():
-    """At a Bogdanov-Takens point, the end of a curve of Hopf points, the period would be infinite."""
+    """At a Bogdanov-Takens point, the end of a curve of Hopf points, the period would be infinite.
+
+    What round-off leaves of the frequency there is none.
+    """
     problem = contin.AlgebraicProblem(
         lambda u, p: (u.y, p.m + p.n * u.y + u.x**2 + u.x * u.y), ["x", "y"], {"m": -1.0, "n": 0.5}
     )
     (hopf,) = contin.trace(contin.solve(problem, [-1, 0]), free=["n"], limits={"n": (0, 2)}).labelled("HB")
     curve = contin.curve(hopf, free=["n", "m"], limits={"m": (-2, 1)})
     assert curve[-1].label == "BT"
-    with pytest.raises(ProblemError, match="no pair on the imaginary axis"):
-        contin.trace(curve[-1], branch=1)
+    for noise in (0, 1e-16, 1e-14, -1e-14):
+        last = dataclasses.replace(curve[-1], x=curve[-1].x + noise)
+        assert last["frequency"] == 0 and math.isnan(last["lyapunov"])
+        with pytest.raises(ProblemError, match="no pair on the imaginary axis"):
+            contin.trace(last, branch=1)
     assert contin.trace(curve[3], branch=1, max_points=3)[0]["period"] == pytest.approx(2 * math.pi / curve[3]["frequency"])
 
 
