@@ -69,8 +69,8 @@ class Coefficient:
 
     @property
     def is_certain(self) -> bool:
-        """Its terms do not cancel, and are so small that it cannot be an error."""
-        return abs(self.value) > ROUGH * self.size and self.size < _MODERATE
+        """Its terms do not cancel, and are neither so large nor so small that it can be an error."""
+        return abs(self.value) > ROUGH * self.size and LOCATED < self.size < _MODERATE
 
     @property
     def vanishes(self) -> bool:
