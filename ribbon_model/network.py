@@ -39,7 +39,7 @@ from contin import (
     solve,
     trace,
 )
-from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
+from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
@@ -614,10 +614,7 @@ class Network:
 
     def _determined(self, point: Point) -> Point:
         """Return a state; raise ProblemError where something can move without a change of energy, if loads have one."""
-        if not self.problem.has_index:
-            return point
-        sizes = np.abs(point.second_variation().eigenvalues)
-        if sizes.size and not sizes.min() > levels.DEPENDENT * sizes.max():
+        if self.problem.has_index and not point.second_variation().is_determined:
             raise ProblemError(MECHANISM)
         return point
 

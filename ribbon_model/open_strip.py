@@ -20,7 +20,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
-from contin.lowlevel import Collocation, Continuation, Undetermined, levels, shown
+from contin.lowlevel import Collocation, Continuation, Undetermined, shown
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
@@ -355,8 +355,7 @@ class OpenStrip:
     def check_determined(self, point: Point) -> None:
         """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
         try:
-            sizes = np.abs(point.second_variation().eigenvalues)
-            if not sizes.size or sizes.min() > levels.DEPENDENT * sizes.max():
+            if point.second_variation().is_determined:
                 return
         except ProblemError as error:
             reason = self._reason(error)

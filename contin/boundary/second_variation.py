@@ -37,7 +37,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
-from contin.levels import DEPENDENT, ROUGH
+from contin.levels import DEPENDENT, LOCATED, ROUGH
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -63,6 +63,12 @@ class SecondVariation:
 
     def __repr__(self) -> str:
         return f"SecondVariation({len(self.eigenvalues)} eigenvalues, {self.index()} of them negative)"
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether no eigenvalue is zero, as far as the state is known: nothing moves without a change of energy."""
+        sizes = np.abs(self.eigenvalues)
+        return not sizes.size or bool(sizes.min() > LOCATED * sizes.max())
 
     def index(self, nullity: int = 0) -> int:
         """Return the number of negative eigenvalues, without the ``nullity`` ones that are nearest to zero."""
@@ -192,10 +198,7 @@ def degeneracy(system: Collocation, x: Array, solved: bool = False) -> str:
         return ""
     if found is None:
         return "energy: it is not convex in the controls there (Legendre's condition)"
-    sizes = np.abs(found.eigenvalues)
-    if sizes.size and not sizes.min() > DEPENDENT * sizes.max():
-        return Undetermined.MODE
-    return ""
+    return "" if found.is_determined else Undetermined.MODE
 
 
 class _Pieces(NamedTuple):
