@@ -24,7 +24,7 @@ from contin.linalg.components import Around, Component, ComponentFactors, Part, 
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
-from contin.linalg.segments import run, share
+from contin.linalg.segments import Share, is_large, run, share
 
 #: Times, states, states at the other end and parameters at which functions are evaluated.
 _At = tuple[Array, Array, Array, Array]
@@ -104,7 +104,11 @@ class BoundaryEquations(OnMesh):
         if self._components:
             return self._factored_apart(x, Bordering(columns, rows))
         residual, blocks = self._assembled(x, rows, columns)
-        return residual, Factorization(self._layout, blocks)
+        return residual, Factorization(self._layout, blocks, self._segments(blocks.local.size))
+
+    def _segments(self, numbers: int) -> Share:
+        """Return the segments of a matrix with so many ``numbers`` in the blocks of all intervals."""
+        return share(self.intervals, numbers)
 
     def _assembled(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Blocks]:
         """Return the residual at x, and the blocks of that matrix."""
@@ -112,7 +116,7 @@ class BoundaryEquations(OnMesh):
         field, jacobian = self._field.jacobian(*self._inside(x), self._columns[0])
         blocks = self._empty_blocks(len(rows), len(columns))
         given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
-        run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
+        run(assemble, given, self._segments(blocks.local.size), (True, False))
         return self._residual(x, field, boundary), blocks
 
     def _empty_blocks(self, rows: int, columns: int) -> Blocks:
@@ -358,13 +362,13 @@ class BoundaryEquations(OnMesh):
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
-        return workspace(self, rows) if share(self.intervals, numbers).last == 1 else None
+        return workspace(self, rows, self._segments(0)) if not is_large(numbers) else None
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""
         work = self.workspace
         assert work is not None
-        return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0))
+        return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0), work.mesh.whole)
 
 
 #: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so

@@ -12,7 +12,7 @@ from contin.collocation.projection import Projections
 from contin.functions.interpreter import Loaded
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.layout import Layout
-from contin.linalg.segments import Share, share
+from contin.linalg.segments import Share
 
 
 class Codes(NamedTuple):
@@ -80,12 +80,11 @@ def put_free(mesh: Mesh, values: Values, x: Array) -> None:
         values.p[mesh.free[i]] = x[mesh.states + i]
 
 
-def workspace(system: Any, rows: int) -> Workspace:
+def workspace(system: Any, rows: int, whole: Share) -> Workspace:
     """Return the work space of a system on a mesh with so many linear conditions besides, which each call fills."""
     n, field, ends = system._n, system._field, system._boundary
     of_field, of_ends = system._columns
     codes = Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
-    whole = share(system.intervals, 0)
     mesh = Mesh(
         system._layout, system.tables, system._h, system.gauss_times, system._free, system.state_size, system._conditions, whole
     )

@@ -24,6 +24,7 @@ from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.levels import APART
 from contin.linalg.factors import Factors
+from contin.linalg.segments import Share, share
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.statement import Statement
 
@@ -86,6 +87,13 @@ class ConnectionEquations(Conditioned):
     def _further(self) -> int:
         """Number of conditions beyond collocation and the equilibria."""
         return int(sum(self.problem.conditions) + self.problem.saddle_node + 1)
+
+    def _segments(self, numbers: int) -> Share:
+        """Return two segments or more: what both ends tell of a long orbit does not say how far it is moved along itself.
+
+        The point between them does.
+        """
+        return share(self.intervals, numbers, 2)
 
     def with_reference(self, x: Array) -> Self:
         """Return the same with v and Q of the orbit x."""

@@ -258,9 +258,9 @@ class MeshLane(Lane):
         may_grow = settings.mesh.every and system.intervals < settings.mesh.max_intervals
         self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
         self._monodromy = system.monodromy
-        width = 2 * n + len(system.free)
-        self._relations = [Relations.unfilled(system.intervals - 1, n, width) for _ in range(2)]
-        self._quotient, self._watched = _quotient(width), settings.branch_points
+        k, segments = len(system.free), self._work.mesh.whole.last
+        self._relations = [Relations.unfilled(system.intervals, n, k, segments) for _ in range(2)]
+        self._quotient, self._watched = _quotient((segments + 1) * n + k), settings.branch_points
         self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
         self._left: tuple[Array, _Begun] | None = None
 
@@ -348,7 +348,7 @@ class MeshLane(Lane):
             return CALM
         before, after = self._relations[::-1]
         self._relations = [before, after]
-        return int(ends_are_calm(self._work.mesh.layout.offsets, factored, before, after, self._quotient, begins))
+        return int(ends_are_calm(self._work.mesh, factored, before, after, self._quotient, begins))
 
     def _stays_regular(self, clear: int, before: Factorization, after: Factorization) -> bool:
         """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""

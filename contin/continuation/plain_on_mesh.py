@@ -12,7 +12,7 @@ from typing import NamedTuple
 from contin.arrays import Array
 from contin.collocation import one_call
 from contin.collocation.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
-from contin.collocation.workspace import Workspace
+from contin.collocation.workspace import Mesh, Workspace
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
@@ -23,7 +23,7 @@ from contin.events.crossings import TURN
 from contin.events.nearness import AS_FAR
 from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
 from contin.levels import APART
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends
@@ -121,14 +121,14 @@ def rests(field: Matrix, n: int, still: float) -> int:
 
 @kernel(reorder=False, last=True)
 def ends_are_calm(
-    offsets: IndexVector, factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int
+    mesh: Mesh, factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int
 ) -> int:
     """Fill in what a matrix says of both ends of the mesh; return what follows for a step, as in `contin.events.crossings`.
 
     Where a step ``begins``, nothing is compared.
     """
     factors, _, first, last, carried, _ = factored
-    relate_ends(offsets, factors, carried[0], first, last, after)
+    relate_ends(mesh.layout.offsets, factors, carried, first, last, mesh.whole.starts, after)
     if begins or not divide_ends(before, after, quotient.quotient, quotient.work) < TURN:
         return TURNS
     return CALM if calm(quotient) else CHANGES

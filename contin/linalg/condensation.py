@@ -1,13 +1,12 @@
 """Factorization of the matrix of a collocation step by condensation, with partial pivoting throughout.
 
-The matrix is drawn in `contin.linalg.layout.Blocks`. It is eliminated in four stages:
+The matrix is drawn in `contin.linalg.layout.Blocks`. It is eliminated in three stages:
 
 1. in each interval, the interior unknowns, group by group (`Layout`); the border rows are reduced along with it;
 2. in each segment, the mesh points inside, one after the other, each from the 2 n rows that contain it; border rows as before;
-3. the mesh points between segments, likewise: n rows are left of each segment;
-4. the dense rest: first and last mesh point and the parameters.
+3. the dense rest: the mesh points where segments begin or end, and the parameters; n rows are left of each segment.
 
-A matrix that is not large is one segment (`contin.linalg.segments`): the third stage is empty.
+A matrix that is not large is one segment (`contin.linalg.segments`): the rest has the first and the last mesh point.
 
 This is the scheme of de Boor & Weiss (1980) in the order that AUTO uses. It takes N (n d)^3 operations and N (n d)^2 numbers;
 solves with the matrix and with its transpose only substitute, in `contin.linalg.substitution`.
@@ -27,7 +26,7 @@ from contin.functions.kernel_parts import Matrix, Stack
 from contin.linalg.elimination import Eliminated, factorize
 from contin.linalg.ends import Relations, relations_of
 from contin.linalg.layout import Blocks, Layout
-from contin.linalg.segments import Share, run, share
+from contin.linalg.segments import Share, is_large, run, share
 from contin.linalg.substitution import solve, solve_transposed, work_size
 from contin.linalg.vector import LANES
 
@@ -58,6 +57,8 @@ class Factorization:
         Order of rows and columns in an interval's block.
     blocks : Blocks
         The matrix; ``local``, ``border`` and ``corner`` are overwritten.
+    whole : Share, optional
+        Its segments; by default as many as suit its size.
 
     Raises
     ------
@@ -68,18 +69,15 @@ class Factorization:
     def __repr__(self) -> str:
         return f"{type(self).__name__}(sign of the determinant {self.sign:g})"
 
-    def __init__(self, layout: Layout, blocks: Blocks) -> None:
-        self._take(layout, blocks)
+    def __init__(self, layout: Layout, blocks: Blocks, whole: Share | None = None) -> None:
+        self._take(layout, blocks, whole)
         factors, corners, first, last, carried, _ = self.room
         given = layout, factors, corners, first, last, carried
         self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
 
     @classmethod
     def unfilled(cls, layout: Layout, blocks: Blocks, whole: Share | None = None) -> Factorization:
-        """Return one of this shape, with ``room`` in which a kernel factors a matrix; it then sets the ``sign``.
-
-        ``whole`` are its segments, by default as many as suit its size.
-        """
+        """Return one of this shape, with ``room`` in which a kernel factors a matrix; it then sets the ``sign``."""
         found = cls.__new__(cls)
         found._take(layout, blocks, whole)
         return found
@@ -88,29 +86,29 @@ class Factorization:
         local, border, corner, first, last = blocks
         intervals, rows, _ = local.shape
         (r, k), (conditions, n) = corner.shape, first.shape
-        size = 2 * n + k
-        if n + conditions + r != size:
+        if conditions + r != n + k:
             raise ValueError(f"{conditions} boundary conditions and {r} border rows for {n} states and {k} parameters")
         self._layout, self._whole = layout, whole or share(intervals, local.size)
+        segments = self._whole.last
+        size = (segments + 1) * n + k
         eliminated = Eliminated(
-            local, border, np.empty((max(intervals - 1, 0), 2 * n + r, n + size)), np.empty((size, size)),
+            local, border, np.empty((max(intervals - 1, 0), 2 * n + r, 3 * n + k)), np.empty((size, size)),
             np.empty((intervals, rows), np.int64), np.empty(size, np.int64),
         )  # fmt: skip
-        segments = self._whole.last
-        corners = corner[None] if segments == 1 else np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
-        work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))
+        corners = corner[None] if segments == 1 else np.concatenate([corner[None], np.empty((segments - 1, r, k))])
+        work = np.empty((work_size(segments, intervals, rows, n, r, k), LANES))
         self.unknowns = intervals * rows + n + k
-        self.room = Factored(eliminated, corners, first, last, np.empty((segments, n + r, size)), work)
+        self.room = Factored(eliminated, corners, first, last, np.empty((segments, n + r, 2 * n + k)), work)
         #: Sign of the determinant up to a factor that depends on the shape only.
         self.sign = math.nan
 
     @functools.cached_property
     def ends(self) -> Relations | None:
-        """What is left between both ends of the mesh; None for a single interval, and for matrices of several segments."""
+        """What is left between both ends of the mesh; None for a single interval, and for large matrices."""
         factors, _, first, last, carried, _ = self.room
-        if self._whole.last > 1 or len(factors.local) == 1:
+        if len(factors.local) == 1 or is_large(factors.local.size):
             return None
-        return relations_of(self._layout.offsets, factors, carried[0], first, last)
+        return relations_of(self._layout.offsets, factors, carried, first, last, self._whole.starts)
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""

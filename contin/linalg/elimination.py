@@ -36,13 +36,13 @@ class Eliminated(NamedTuple):
     local, border : ndarray
         Stage 1: those of the `Blocks`, eliminated in place; drawn in `_eliminate_interiors`.
     chain : ndarray, shape (N - 1, 2 n + r, 3 n + k)
-        Stage 2: the rows that contain a mesh point, drawn in `_condense_points`.
-    dense : ndarray, shape (2 n + k, 2 n + k)
-        Stage 3: what is left, drawn in `_eliminate_dense`.
+        Stage 2: the rows that contain a mesh point, drawn in `_eliminate_point`; not used where segments meet.
+    dense : ndarray, shape ((S + 1) n + k, (S + 1) n + k)
+        Stage 3: what is left of S segments, drawn in `_eliminate_dense`.
     pivots : ndarray of int, shape (N, n d)
         For each eliminated column the row in which its pivot was found, counted in the block: the interior columns of
-        interval j, then the n columns of mesh point j (not used for j = 0).
-    pivots_dense : ndarray of int, shape (2 n + k,)
+        interval j, then the n columns of mesh point j (not used where segments begin).
+    pivots_dense : ndarray of int, shape ((S + 1) n + k,)
         The same for the columns of ``dense``.
     """
 
@@ -207,7 +207,7 @@ def _subtract_panel(rows, count, pivots, start, size, finish, tail, width):
         subtract_products(target, factors, source, width - tail, count, size)
 
 
-# --- the four stages -------------------------------------------------------------------------------------------------
+# --- the three stages ------------------------------------------------------------------------------------------------
 
 
 @helper(inline=True)
@@ -325,42 +325,35 @@ def _condense_points(layout, work, part, corner, carried):
     return sign
 
 
-@helper(inline=True)
-def _join_segments(work, starts, n, carried):
-    """Eliminate the mesh points between segments (stage 3); return the sign of the product of pivots.
-
-    The rows of a segment are those that it has ``carried`` (S, n + r, 2 n + k). The first of them takes what is left.
-    """
-    rows, (segments, height, width) = work.local.shape[1], carried.shape
-    sign = 1.0
-    for s in range(1, segments):
-        j, these, total = starts[s], carried[s], carried[0]
-        block = work.chain[j - 1]
-        copy_rows(at(block, n, 0), at(these, 0, 0), n, height)
-        copy_rows(at(block, n, 2 * n), at(these, 0, n), width - n, height)
-        for i in range(n, height):
-            for b in range(2 * n, width):
-                total[i, b] += these[i, b]
-        sign *= _eliminate_point(block, total, work.pivots[j, rows - n :])
-    return sign
-
-
 @helper
 def _eliminate_dense(carried, first, last, dense, pivots):
-    """Eliminate the rest of the matrix (stage 4); return the sign of the product of pivots.
+    """Eliminate the rest of the matrix (stage 3); return the sign of the product of pivots.
 
-    Its rows, square together::
+    Its rows, square together, for two segments between the mesh points p0, p1 and p2::
 
-                     first point   last point   parameters
-        carried   [  x             x            x     ]   n rows
-        boundary  [  first         last         last  ]   n_bc rows
-        border    [  x             x            x     ]   r rows, carried as well
+                     p0      p1   p2     parameters
+        carried   [  x       x           x     ]   n rows
+        carried   [          x    x      x     ]   n rows
+        boundary  [  first        last   last  ]   n_bc rows
+        border    [  x       x    x      x     ]   r rows, the sum over the segments
     """
-    (conditions, n), size = first.shape, dense.shape[0]
-    copy_rows(at(dense, 0, 0), at(carried, 0, 0), size, n)
-    copy_rows(at(dense, n, 0), at(first, 0, 0), n, conditions)
-    copy_rows(at(dense, n, n), at(last, 0, 0), size - n, conditions)
-    copy_rows(at(dense, n + conditions, 0), at(carried, n, 0), size, carried.shape[0] - n)
+    (conditions, n), (segments, height, width), size = first.shape, carried.shape, dense.shape[0]
+    end, k = segments * n, width - 2 * n
+    border = end + conditions
+    for i in range(size):
+        for b in range(size):
+            dense[i, b] = 0.0
+    for s in range(segments):
+        these, left = carried[s], s * n
+        copy_rows(at(dense, left, left), at(these, 0, 0), 2 * n, n)
+        copy_rows(at(dense, left, end + n), at(these, 0, 2 * n), k, n)
+        for i in range(height - n):
+            for b in range(2 * n):
+                dense[border + i, left + b] += these[n + i, b]
+            for b in range(k):
+                dense[border + i, end + n + b] += these[n + i, 2 * n + b]
+    copy_rows(at(dense, end, 0), at(first, 0, 0), n, conditions)
+    copy_rows(at(dense, end, end), at(last, 0, 0), n + k, conditions)
     return eliminate(dense, whole_step(size), pivots)
 
 
@@ -371,17 +364,19 @@ def factorize(
     """Factor a matrix and return the sign of its determinant, up to a factor that depends on the shape only.
 
     ``work`` holds the local and the border blocks and takes the result; ``first`` and ``last`` are those of the `Blocks`.
-    ``corners`` (S, r, k) are the corner of the `Blocks` for the first segment, zero for the others; they are overwritten.
-    ``carried`` (S, n + r, 2 n + k) is scratch space. The first stage of a `Share` condenses segments, the second joins them.
+    ``corners`` (S, r, k) begin with the corner of the `Blocks`, and have room for the other segments; they are overwritten.
+    ``carried`` (S, n + r, 2 n + k) takes what is left of the segments. The first stage of a `Share` condenses them, the second
+    eliminates the rest.
     The sign is that of the share; the product of all is the sign of the determinant.
     """
     sign = 1.0
     if share.stage != 1:
         for s in range(share.first, share.last):
             part = Range(share.starts[s], share.starts[s + 1])
+            if s > 0:
+                corners[s, :, :] = 0.0
             sign *= _eliminate_interiors(layout, work, part, corners[s])
             sign *= _condense_points(layout, work, part, corners[s], carried[s])
     if share.stage != 0:
-        sign *= _join_segments(work, share.starts, layout.order.size, carried)
-        sign *= _eliminate_dense(carried[0], first, last, work.dense, work.pivots_dense)
+        sign *= _eliminate_dense(carried, first, last, work.dense, work.pivots_dense)
     return sign

@@ -10,7 +10,10 @@ multiples of the same rows, without their part in it::
                [  boundary     boundary     boundary ]
                [  border       border       border   ]
 
-This matrix is singular where the whole one is, with a kernel of the same dimension, and has 2 n + k rows.
+Of a matrix in S segments each has its own relations, from its first point on; the condensed matrix has S n rows R, which relate
+the points where segments begin or end, as in `contin.linalg.elimination`.
+
+This matrix is singular where the whole one is, with a kernel of the same dimension, and has (S + 1) n + k rows.
 """
 
 from __future__ import annotations
@@ -32,55 +35,78 @@ class Relations(NamedTuple):
 
     Attributes
     ----------
-    relations : ndarray, shape (N - 1, n, 2 n + k)
-        Orthonormal rows that relate the first mesh point to each of the others, from the second on.
-    others : ndarray, shape (n_bc + r, 2 n + k)
-        Boundary conditions and border.
-    sides : ndarray, shape (N - 1,)
+    relations : ndarray, shape (N - S, n, 2 n + k)
+        Orthonormal rows that relate the first mesh point of a segment to each of the others in it, from the second on.
+    sides : ndarray, shape (N - S,)
         On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
+    condensed : ndarray, shape ((S + 1) n + k, (S + 1) n + k)
+        The condensed matrix.
+    others : int
+        How many of its rows are boundary conditions and border.
     """
 
     relations: Stack
-    others: Matrix
     sides: Vector
+    condensed: Matrix
+    others: int
 
     @classmethod
-    def unfilled(cls, points: int, n: int, width: int) -> Relations:
-        """Return room for N - 1 ``points`` and 2 n + k columns: as many as there are rows."""
-        return cls(np.empty((points, n, width)), np.empty((width - n, width)), np.empty(points))
+    def unfilled(cls, intervals: int, n: int, k: int, segments: int) -> Relations:
+        """Return room for those of a matrix with so many parameters."""
+        points, size = intervals - segments, (segments + 1) * n + k
+        return cls(np.empty((points, n, 2 * n + k)), np.empty(points), np.empty((size, size)), n + k)
 
 
 @kernel
 def relate_ends(
-    offsets: IndexVector, factors: Eliminated, carried: Matrix, first: Matrix, last: Matrix, found: Relations
-) -> None:
+    offsets: IndexVector, factors: Eliminated, carried: Stack, first: Matrix, last: Matrix, starts: IndexVector,
+    found: Relations,
+) -> None:  # fmt: skip
     """Fill in relations, by the arguments of `relations_of`."""
-    relations, others, sides = found
-    points, n, width = relations.shape
-    rows = factors.local.shape[1]
-    side = _side_of_interval(factors, 0, offsets)
-    for j in range(points):
-        block, span = factors.chain[j], relations[j]
-        side *= _side_of_interval(factors, j + 1, offsets) * _side(block, factors.pivots[j + 1, rows - n :], 0, 0, n)
-        sides[j] = side
+    relations, sides, condensed, _ = found
+    (conditions, n), segments, (_, height, width), rows = first.shape, starts.size - 1, carried.shape, factors.local.shape[1]
+    end, size, number = segments * n, condensed.shape[0], 0
+    for i in range(size):
+        for b in range(size):
+            condensed[i, b] = 0.0
+    for s in range(segments):
+        side = _side_of_interval(factors, starts[s], offsets)
+        for j in range(starts[s] + 1, starts[s + 1]):
+            block, span = factors.chain[j - 1], relations[number]
+            side *= _side_of_interval(factors, j, offsets) * _side(block, factors.pivots[j, rows - n :], 0, 0, n)
+            sides[number] = side
+            for i in range(n):
+                for b in range(width):
+                    span[i, b] = block[n + i, n + b]
+                orthonormalize_row(span, i)
+            number += 1
         for i in range(n):
-            for b in range(width):
-                span[i, b] = block[n + i, n + b]
-            orthonormalize_row(span, i)
-    conditions, span = first.shape[0], relations[points - 1]
+            _put_row(condensed[s * n + i], relations[number - 1, i], s * n, end + n, n)
+            if s > 0:
+                orthonormalize_row(condensed, s * n + i)
     for i in range(conditions):
+        row = condensed[end + i]
         for b in range(n):
-            others[i, b] = first[i, b]
+            row[b] = first[i, b]
         for b in range(width - n):
-            others[i, n + b] = last[i, b]
-    for i in range(carried.shape[0] - n):
-        row = others[conditions + i]
-        for b in range(width):
-            row[b] = carried[n + i, b]
-        for k in range(n):
-            product = _product(carried[n + i], span[k])
-            for b in range(width):
-                row[b] -= product * span[k, b]
+            row[end + b] = last[i, b]
+    for i in range(height - n):
+        row = condensed[end + conditions + i]
+        for s in range(segments):
+            _put_row(row, carried[s, n + i], s * n, end + n, n)
+        for k in range(end):
+            product = _product(row, condensed[k])
+            for b in range(size):
+                row[b] -= product * condensed[k, b]
+
+
+@helper
+def _put_row(row, part, left, right, n):
+    """Add a row by [first point | last point | parameters] of a segment to a row of the condensed matrix."""
+    for b in range(2 * n):
+        row[left + b] += part[b]
+    for b in range(part.size - 2 * n):
+        row[right + b] += part[2 * n + b]
 
 
 @helper
@@ -116,9 +142,10 @@ def _product(one, other):
 
 @kernel
 def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
-    """Fill the ``quotient`` (2 n + k, 2 n + k), and return the largest turn, both described in `compared`."""
-    points, n, size = before.relations.shape
-    largest = 0.0
+    """Fill the ``quotient`` ((S + 1) n + k squared), and return the largest turn, both described in `compared`."""
+    points, n, _ = before.relations.shape
+    size = before.condensed.shape[0]
+    largest, related = 0.0, size - before.others
     for j in range(points):
         total = float(n)
         for i in range(n):
@@ -130,17 +157,15 @@ def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Mat
             total = math.inf
         if not total <= largest:
             largest = total
-    one, other = before.relations[points - 1], after.relations[points - 1]
-    for i in range(n):
+    for i in range(size):
         for b in range(size):
-            quotient[i, b], work[i, b] = one[i, b], 0.0
-        for k in range(n):
-            product = _product(one[i], other[k])
+            quotient[i, b] = before.condensed[i, b]
+            work[i, b] = 0.0 if i < related else after.condensed[i, b]
+    for i in range(related):
+        for k in range(related):
+            product = _product(before.condensed[i], after.condensed[k])
             for b in range(size):
-                work[i, b] += product * other[k, b]
-    for i in range(n, size):
-        for b in range(size):
-            quotient[i, b], work[i, b] = before.others[i - n, b], after.others[i - n, b]
+                work[i, b] += product * after.condensed[k, b]
     _solve(work, quotient)
     return largest
 
@@ -235,7 +260,9 @@ def is_near_one(matrix: Matrix, apart: float, factor: float, work: Matrix) -> in
     return 1
 
 
-def relations_of(offsets: Indices, factors: Eliminated, carried: Array, first: Array, last: Array) -> Relations:
+def relations_of(
+    offsets: Indices, factors: Eliminated, carried: Array, first: Array, last: Array, starts: Indices
+) -> Relations:
     """Return what condensation has left of a matrix.
 
     Parameters
@@ -243,13 +270,16 @@ def relations_of(offsets: Indices, factors: Eliminated, carried: Array, first: A
     offsets : ndarray of int
         Where the groups of states begin, as in `contin.linalg.layout.Layout`.
     factors : Eliminated
-    carried : ndarray, shape (n + r, 2 n + k)
-        The rows that relate both ends, and the border.
+    carried : ndarray, shape (S, n + r, 2 n + k)
+        The rows that relate both ends of each segment, and their share of the border.
     first, last : ndarray, shape (n_bc, n) and (n_bc, n + k)
         The boundary conditions.
+    starts : ndarray of int, shape (S + 1,)
+        The first intervals of the segments, and N.
     """
-    found = Relations.unfilled(len(factors.chain), first.shape[1], carried.shape[1])
-    relate_ends(offsets, factors, carried, first, last, found)
+    n = first.shape[1]
+    found = Relations.unfilled(len(factors.local), n, carried.shape[2] - 2 * n, len(carried))
+    relate_ends(offsets, factors, carried, first, last, starts, found)
     return found
 
 
@@ -261,6 +291,6 @@ def compared(before: Relations, after: Relations) -> tuple[Array, float]:
     between the two spans of relations; infinity where a span has turned to its other side, as where a mode that no end feels
     becomes singular inside.
     """
-    quotient, work = np.empty((2, *([before.relations.shape[2]] * 2)))
+    quotient, work = np.empty((2, *before.condensed.shape))
     turn = divide_ends(before, after, quotient, work)
     return quotient, turn

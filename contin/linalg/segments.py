@@ -1,7 +1,7 @@
 """Segments: parts of a long mesh that are assembled, eliminated and solved for independently, by several threads.
 
 Their number depends on the size of the matrix only, and so does the order of the arithmetic: results have the same bits for
-any number of threads. A matrix that is not large is one segment.
+any number of threads. A matrix that is not large is one segment, or as many as its problem wants.
 """
 
 from __future__ import annotations
@@ -38,9 +38,14 @@ class Share(NamedTuple):
 ALL = -1
 
 
-def share(intervals: int, numbers: int) -> Share:
-    """Return the whole of a matrix with this many intervals and ``numbers`` in their blocks."""
-    return _share(intervals, max(1, min(PARTS, intervals // 2)) if numbers >= _LARGE else 1)
+def is_large(numbers: int) -> bool:
+    """Return whether so many numbers in the blocks of all intervals are worth several threads."""
+    return numbers >= _LARGE
+
+
+def share(intervals: int, numbers: int, least: int = 1) -> Share:
+    """Return the whole of a matrix with this many intervals and ``numbers`` in their blocks: ``least`` segments or more."""
+    return _share(intervals, max(1, min(PARTS if is_large(numbers) else least, intervals // 2)))
 
 
 @functools.lru_cache(maxsize=32)  # each matrix of a mesh asks for it

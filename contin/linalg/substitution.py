@@ -56,56 +56,52 @@ class Vectors(NamedTuple):
 class Joint(NamedTuple):
     """The vectors that all segments share.
 
-    ``rest`` (n + k,) is the right-hand side behind the collocation rows, and then the solution there. ``dense`` (2 n + k,) are
-    entries of the dense rest, ``known`` and ``border`` as in `Vectors`. ``pair`` (S + 1, 2 n) belongs to the mesh points on the
-    left of the segments, and its last entries to the last mesh point.
+    ``rest`` (n + k,) is the right-hand side behind the collocation rows, and then the solution there. ``dense`` are entries of
+    the dense rest, (S + 1) n + k, and ``border`` is the sum of those of the segments.
     """
 
     rest: int
     dense: int
-    known: int
     border: int
-    pair: int
 
 
-def work_size(segments: int, intervals: int, rows: int, n: int, r: int, size: int) -> int:
-    """Return the number of entries of `Joint` and `Vectors`, for blocks of n d ``rows`` and a dense rest of ``size`` rows."""
-    return 3 * size - n + r + (segments + 1) * 2 * n + intervals * (3 * rows + 2 * n) + segments * (2 * n + r + size)
+def work_size(segments: int, intervals: int, rows: int, n: int, r: int, k: int) -> int:
+    """Return the number of entries of `Joint` and `Vectors`, for blocks of n d ``rows``."""
+    joint = n + k + (segments + 1) * n + k + r
+    return joint + intervals * (3 * rows + 2 * n) + segments * (4 * n + k + r)
 
 
 class Sizes(NamedTuple):
-    """Numbers of segments S, of rows n d of an interval's block, of states n, of border rows r, and of dense rows 2 n + k."""
+    """Numbers of segments S, of rows n d of an interval's block, of states n, of border rows r, and of parameters k."""
 
     segments: int
     rows: int
     n: int
     r: int
-    dense: int
+    k: int
 
 
 @helper(inline=True)
 def _sizes(factors, n, starts):
     """Return the sizes of a solve."""
-    return Sizes(starts.size - 1, factors.local.shape[1], n, factors.border.shape[1], factors.dense.shape[0])
+    segments, rows, width = starts.size - 1, factors.local.shape[1], factors.local.shape[2]
+    return Sizes(segments, rows, n, factors.border.shape[1], width - rows - n)
 
 
 @helper
 def _joint(work, sizes):
     """Return places of the joint vectors in work space at an address."""
-    segments, rows, n, r, size = sizes
-    dense = entry(work, size - n)
-    known = entry(dense, size)
-    border = entry(known, size)
-    return Joint(work, dense, known, border, entry(border, r))
+    segments, rows, n, r, k = sizes
+    dense = entry(work, n + k)
+    return Joint(work, dense, entry(dense, (segments + 1) * n + k))
 
 
 @helper
 def _vectors(work, sizes, part, s):
     """Return places of the vectors of segment s, with the intervals of ``part``, in work space at an address."""
-    segments, rows, n, r, size = sizes
-    count = part.last - part.first
-    before = 3 * size - n + r + (segments + 1) * 2 * n + part.first * (3 * rows + 2 * n) + s * (2 * n + r + size)
-    given = entry(work, before)
+    segments, rows, n, r, k = sizes
+    count, joint = part.last - part.first, n + k + (segments + 1) * n + k + r
+    given = entry(work, joint + part.first * (3 * rows + 2 * n) + s * (4 * n + k + r))
     found = entry(given, count * rows + n)
     inner = entry(found, count * rows + n)
     pair = entry(inner, count * rows)
@@ -250,27 +246,20 @@ def _forward_interiors(layout, factors, part, vectors):
             _move(entry(remaining, offsets[g]), entry(inner, step.bottom - size), size)
 
 
-@helper
-def _forward_point(block, step, r, pivots, pair, border):
-    """Apply the elimination of a mesh point to the ``pair`` of its rows, and reduce the ``border``."""
-    _forward(block, step, pivots, pair)
-    _subtract(within(block, step.bottom, 0), Range(0, r), step, pair, border)
-
-
 @helper(inline=True)
 def _forward_points(factors, n, part, vectors):
     """Apply stage 2: fill the first half of each ``pair``, and reduce the ``border``."""
-    step = point_step(n, factors.chain.shape[2])
+    step, r = point_step(n, factors.chain.shape[2]), factors.border.shape[1]
     for j in range(part.first + 1, part.last):
-        pair = entry(vectors.pair, 2 * n * (j - part.first))
+        block, pair = page(factors.chain, j - 1), entry(vectors.pair, 2 * n * (j - part.first))
         _move(pair, entry(pair, -n), n)
-        pivots = factors.pivots[j, factors.local.shape[1] - n :]
-        _forward_point(page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
+        _forward(block, step, factors.pivots[j, factors.local.shape[1] - n :], pair)
+        _subtract(within(block, step.bottom, 0), Range(0, r), step, pair, vectors.border)
 
 
 @helper(inline=True)
 def _solve_dense(factors, x):
-    """Solve stage 4: replace the right-hand sides by [first point | last point | parameters]."""
+    """Solve stage 3: replace the right-hand sides by [mesh points where segments begin or end | parameters]."""
     block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
     _forward(block, step, factors.pivots_dense, x)
     _backward(block, step, x, x)
@@ -303,42 +292,28 @@ def _backward_interiors(layout, factors, part, vectors):
 
 @helper(inline=True)
 def _solve_joint(factors, sizes, starts, place):
-    """Apply stage 3 and solve stages 4 and 3: the mesh points between segments, both ends, and the parameters.
+    """Solve stage 3: for the mesh points where segments begin or end, and for the parameters.
 
     Each segment gives what it carries, the second half of its last ``pair``, and its ``border``; it gets both its ends, the
-    first mesh point of the segment in ``known``, and the parameters there.
+    first one in ``known`` too, and the parameters there.
     """
-    segments, rows, n, r, size = sizes
-    joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
+    segments, rows, n, r, k = sizes
+    joint, end = _joint(place, sizes), segments * n
+    _clear(joint.border, r)
     for s in range(segments):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
-        _move(entry(pair, n), entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), n)
-        if s == 0:
-            _move(joint.border, vectors.border, r)
-        else:
-            _add(joint.border, vectors.border, r)
-    for s in range(1, segments):
-        pair = entry(joint.pair, 2 * n * s)
-        _move(pair, entry(pair, -n), n)
-        pivots = factors.pivots[starts[s], rows - n :]
-        _forward_point(page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
-    _move(joint.dense, entry(joint.pair, (2 * segments - 1) * n), n)
-    _move(entry(joint.dense, n), joint.rest, size - n - r)
-    _move(entry(joint.dense, size - r), joint.border, r)
+        vectors = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s)
+        _move(entry(joint.dense, s * n), entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), n)
+        _add(joint.border, vectors.border, r)
+    _move(entry(joint.dense, end), joint.rest, n + k - r)
+    _move(entry(joint.dense, end + n + k - r), joint.border, r)
     _solve_dense(factors, joint.dense)
-    _move(joint.rest, entry(joint.dense, n), size - n)
-    _move(joint.known, joint.dense, size)
-    for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
-        _move(entry(vectors.found, (starts[s + 1] - starts[s]) * rows), entry(joint.known, n), n)
-        if s > 0:
-            _backward(page(factors.chain, starts[s] - 1), step, pair, joint.known)
-            _move(entry(joint.known, n), pair, n)
-        else:
-            _move(entry(joint.known, n), joint.known, n)
-        _move(vectors.found, entry(joint.known, n), n)
-        _move(vectors.known, vectors.found, n)
-        _move(entry(vectors.known, 2 * n), entry(joint.known, 2 * n), size - 2 * n)
+    _move(joint.rest, entry(joint.dense, end), n + k)
+    for s in range(segments):
+        vectors, begins = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.dense, s * n)
+        _move(vectors.found, begins, n)
+        _move(entry(vectors.found, (starts[s + 1] - starts[s]) * rows), entry(begins, n), n)
+        _move(vectors.known, begins, n)
+        _move(entry(vectors.known, 2 * n), entry(joint.dense, end + n), k)
 
 
 @kernel
@@ -350,8 +325,8 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
     """
     starts, place = share.starts, address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
-    _, rows, n, r, size = sizes
-    collocation, tail = factors.local.shape[0] * rows, size - n
+    _, rows, n, r, k = sizes
+    collocation, tail = factors.local.shape[0] * rows, n + k
     joint = _joint(place, sizes)
     for first in range(0, b.shape[0], LANES):
         given, found, count = at(b, first, 0), at(x, first, 0), b.shape[0] - first
@@ -397,50 +372,36 @@ def _interiors_transposed(layout, factors, part, vectors):
         _put(given, layout.ends, Range(0, 2 * n), vectors.known)
 
 
-@helper
-def _point_transposed(block, step, point, after, known):
-    """Solve the triangle of a mesh point; subtract what it contributes to the first one, the one ``after``, and parameters."""
-    n = step.right
-    _move(entry(known, n), after, n)
-    _forward_transposed(block, step, point, known)
-    _move(after, entry(known, n), n)
-
-
 @helper(inline=True)
 def _points_transposed(factors, n, part, vectors):
-    """Solve the triangles of stage 2."""
+    """Solve the triangles of stage 2; subtract what a point contributes to the first one, the next one, and the parameters."""
     rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     _move(vectors.known, vectors.given, n)
     for j in range(part.first + 1, part.last):
         point = entry(vectors.given, (j - part.first) * rows)
-        _point_transposed(page(factors.chain, j - 1), step, point, entry(point, rows), vectors.known)
+        _move(entry(vectors.known, n), entry(point, rows), n)
+        _forward_transposed(page(factors.chain, j - 1), step, point, vectors.known)
+        _move(entry(point, rows), entry(vectors.known, n), n)
     _move(vectors.given, vectors.known, n)
 
 
 @helper(inline=True)
 def _solve_dense_transposed(factors, x):
-    """Solve the transpose of stage 4: replace [first point | last point | parameters] by multipliers of its rows."""
+    """Solve the transpose of stage 3: replace these unknowns by the multipliers of its rows."""
     block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
     _forward_transposed(block, step, x, x)
     _backward_transposed(block, step, factors.pivots_dense, x)
 
 
-@helper
-def _multipliers_of_point(block, step, r, pivots, pair, border):
-    """Apply the transpose of the elimination of a mesh point: turn its ``pair`` into the multipliers of its rows."""
-    _subtract_transposed(within(block, step.bottom, 0), Range(0, r), step, border, pair)
-    _backward_transposed(block, step, pivots, pair)
-
-
 @helper(inline=True)
 def _multipliers_of_points(factors, n, part, vectors):
     """Apply the transpose of stage 2: fill each ``pair`` with the multipliers of its rows."""
-    rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
+    rows, step, r = factors.local.shape[1], point_step(n, factors.chain.shape[2]), factors.border.shape[1]
     for j in range(part.last - 1, part.first, -1):
-        pair = entry(vectors.pair, 2 * n * (j - part.first))
+        block, pair = page(factors.chain, j - 1), entry(vectors.pair, 2 * n * (j - part.first))
         _move(pair, entry(vectors.given, (j - part.first) * rows), n)
-        pivots = factors.pivots[j, rows - n :]
-        _multipliers_of_point(page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
+        _subtract_transposed(within(block, step.bottom, 0), Range(0, r), step, vectors.border, pair)
+        _backward_transposed(block, step, factors.pivots[j, rows - n :], pair)
         _move(entry(pair, -n), pair, n)
 
 
@@ -466,40 +427,25 @@ def _multipliers_of_interiors(layout, factors, part, vectors):
 
 @helper(inline=True)
 def _solve_joint_transposed(factors, sizes, starts, place):
-    """Solve the triangles of stage 3 and stage 4, and apply the transpose of stage 3.
+    """Solve the transpose of stage 3.
 
     Each segment gives what is left for both its ends and for the parameters; it gets the multipliers of the rows that it
     carries, in the second half of its last ``pair``, and of the ``border``.
     """
-    segments, rows, n, r, size = sizes
-    joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
+    segments, rows, n, r, k = sizes
+    joint, end = _joint(place, sizes), segments * n
+    _clear(joint.dense, end + n + k)
     for s in range(segments):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
-        if s == 0:
-            _move(entry(joint.known, 2 * n), entry(vectors.known, 2 * n), size - 2 * n)
-            _move(joint.known, vectors.given, n)
-        else:
-            _add(entry(joint.known, 2 * n), entry(vectors.known, 2 * n), size - 2 * n)
-            _add(pair, vectors.given, n)
-        _move(entry(pair, 2 * n), entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
-    for s in range(1, segments):
-        pair = entry(joint.pair, 2 * n * s)
-        _point_transposed(page(factors.chain, starts[s] - 1), step, pair, entry(pair, 2 * n), joint.known)
-    _move(joint.dense, joint.known, n)
-    _move(entry(joint.dense, n), entry(joint.pair, 2 * n * segments), n)
-    _move(entry(joint.dense, 2 * n), entry(joint.known, 2 * n), size - 2 * n)
+        vectors, begins = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.dense, s * n)
+        _add(begins, vectors.given, n)
+        _add(entry(begins, n), entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
+        _add(entry(joint.dense, end + n), entry(vectors.known, 2 * n), k)
     _solve_dense_transposed(factors, joint.dense)
-    _move(joint.rest, entry(joint.dense, n), size - n)
-    _move(joint.border, entry(joint.dense, size - r), r)
-    _move(entry(joint.pair, (2 * segments - 1) * n), joint.dense, n)
-    for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
-        if s > 0:
-            pivots = factors.pivots[starts[s], rows - n :]
-            _multipliers_of_point(page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
-            _move(entry(pair, -n), pair, n)
-        _move(entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), entry(pair, n), n)
-        _move(vectors.border, joint.border, r)
+    _move(joint.rest, entry(joint.dense, end), n + k)
+    for s in range(segments):
+        vectors = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s)
+        _move(entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), entry(joint.dense, s * n), n)
+        _move(vectors.border, entry(joint.dense, end + n + k - r), r)
 
 
 @kernel
@@ -507,8 +453,8 @@ def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: 
     """Solve J^T y = c for rows of c (m, unknowns) and of y (m, equations), with ``work`` and ``share`` as for `solve`."""
     starts, place = share.starts, address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
-    segments, rows, n, _, size = sizes
-    collocation, tail = factors.local.shape[0] * rows, size - n
+    segments, rows, n, _, k = sizes
+    collocation, tail = factors.local.shape[0] * rows, n + k
     joint = _joint(place, sizes)
     for first in range(0, c.shape[0], LANES):
         given, found, count = at(c, first, 0), at(y, first, 0), c.shape[0] - first
@@ -524,9 +470,9 @@ def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: 
                 else:
                     _clear(right, n)
                 if s == 0:
-                    side_by_side(parameters, within(given, 0, collocation + n), size - 2 * n, count)
+                    side_by_side(parameters, within(given, 0, collocation + n), k, count)
                 else:
-                    _clear(parameters, size - 2 * n)
+                    _clear(parameters, k)
                 _interiors_transposed(layout, factors, part, vectors)
                 _points_transposed(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:

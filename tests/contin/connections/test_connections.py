@@ -224,3 +224,32 @@ def test_a_front_that_neither_end_feels_is_followed_in_few_steps():
     branch = trace(stw.front(), free=["p", "c"], limits={"p": (0, 1.1)}, zeros={"p": [1.0]}, max_points=60, errors=False)
     assert branch.stop.reason == "limit" and not branch.labelled("BP")
     assert abs(branch.labelled("UZ")[0]["c"]) < 1e-9  # the front stands still
+
+
+@pytest.mark.parametrize("length", [40.0, 160.0, 640.0])
+def test_a_pulse_keeps_its_place_for_any_time(length):
+    """Exact: w'' = a w - w^2 + c w', w = u - a, has the pulse 3 a / 2 sech^2(sqrt(a) s / 2) with c = 0, and its tangent by a.
+
+    At the ends of a long time it is 0 to round-off, where nothing tells how far it is moved along itself.
+    """
+
+    def field(u, p):
+        w = u.u - p.a
+        return u.v, p.a * w - w**2 + p.c * u.v
+
+    def pulse(s, a):
+        root = math.sqrt(a)
+        w = 1.5 * a / np.cosh(root * s / 2) ** 2
+        return np.array([a + w, -root * w * np.tanh(root * s / 2)])
+
+    problem = ConnectionProblem(field, ["u", "v"], {"a": 1.0, "c": 0.0}, unstable=1)
+    first = solve(problem, lambda t: pulse(length * (t - 0.5), 1.0), {"time": length, "from_u": 1.0}, free=["c"])
+    branch = trace(first, free=["a", "c"], limits={"a": (0.5, 2.0)})
+    assert [point.label for point in branch if point.label] == ["EP", "EP"]
+    for point in branch:
+        s = length * (point.system.mesh - 0.5)
+        a, states = point["a"], point.system.states(point.x)[:: point.system.degree]
+        assert abs(point["c"]) < 1e-10 and states.T == pytest.approx(pulse(s, a), abs=1e-7)
+        by_a = (pulse(s, a + 1e-4) - pulse(s, a - 1e-4)) / 2e-4
+        tangent = point.system.states(point.tangent)[:: point.system.degree] / point.tangent[point.system.parameter_index("a")]
+        assert tangent.T == pytest.approx(by_a, abs=1e-5)

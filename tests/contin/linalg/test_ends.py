@@ -8,13 +8,15 @@ import pytest
 from contin import BoundaryValueProblem
 from contin.boundary.system import Collocation
 from contin.linalg.ends import compared, is_near_one
+from contin.linalg.segments import share
 
 COLUMN = BoundaryValueProblem(lambda t, u, p: (u.v, -p.P * u.u), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 1.0})
 
 
-def ends(load, intervals=12, problem=COLUMN):
+def ends(load, intervals=12, problem=COLUMN, segments=1):
     """Return what is left of the matrix of a straight column, bordered by the tangent of its branch."""
     system = Collocation(problem, np.linspace(0, 1, intervals + 1) ** 1.2, 7, ["P"], {})
+    system._segments = lambda numbers: share(intervals, numbers, segments)
     x = np.zeros(system.size)
     tangent = np.zeros(system.size)
     x[-1], tangent[-1] = load, 1.0
@@ -34,22 +36,26 @@ def wells(*places):
     return BoundaryValueProblem(column, lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 1.0})
 
 
+@pytest.mark.parametrize("segments", [1, 2, 4])
 @pytest.mark.parametrize("load", [0.0, 3.0, 40.0])
-def test_relations_hold_for_every_solution(load):
-    """Closed form: cos(w t) and sin(w t) / w, at t = 0 and at every mesh point; no load acts on the straight column."""
-    mesh, found = ends(load)
-    w = math.sqrt(load) or 1e-8
-    for first, rows in enumerate(found.relations, start=2):
-        t = mesh[first]
+def test_relations_hold_for_every_solution(load, segments):
+    """Closed form: cos(w t) and sin(w t) / w, from the first point of a segment on; no load acts on the straight column."""
+    mesh, found = ends(load, segments=segments)
+    w, each = math.sqrt(load) or 1e-8, 12 // segments
+    places = [(mesh[s * each], mesh[s * each + j]) for s in range(segments) for j in range(2, each + 1)]
+    assert len(places) == len(found.relations)
+    for (start, end), rows in zip(places, found.relations):
+        t = end - start
         for u, v, u_0, v_0 in ((math.cos(w * t), -w * math.sin(w * t), 1, 0), (math.sin(w * t) / w, math.cos(w * t), 0, 1)):
             assert rows @ [u_0, v_0, u, v, 0] == pytest.approx([0, 0], abs=1e-12)
         assert rows @ rows.T == pytest.approx(np.eye(2), abs=1e-14)
 
 
+@pytest.mark.parametrize("segments", [1, 2, 3, 6])
 @pytest.mark.parametrize(("load", "other", "passed"), [(5, 9, 0), (8, 11, 1), (12, 14, 0), (39, 40, 1), (86, 88, 0)])
-def test_a_buckling_load_turns_one_eigenvalue_negative(load, other, passed):
+def test_a_buckling_load_turns_one_eigenvalue_negative(load, other, passed, segments):
     """Buckling loads are (k pi)^2: 9.87, 39.48, 88.83."""
-    before, after = ends(load)[1], ends(other)[1]
+    before, after = ends(load, segments=segments)[1], ends(other, segments=segments)[1]
     quotient, turn = compared(before, after)
     values = np.linalg.eigvals(quotient)
     assert (np.count_nonzero((np.abs(values.imag) < 1e-9) & (values.real < 0)), turn < 0.5) == (passed, True)
