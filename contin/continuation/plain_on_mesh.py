@@ -120,9 +120,7 @@ def rests(field: Matrix, n: int, still: float) -> int:
 
 
 @kernel(reorder=False, last=True)
-def ends_are_calm(
-    mesh: Mesh, factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int
-) -> int:
+def ends_are_calm(mesh: Mesh, factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
     """Fill in what a matrix says of both ends of the mesh; return what follows for a step, as in `contin.events.crossings`.
 
     Where a step ``begins``, nothing is compared.
