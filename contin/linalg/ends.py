@@ -10,8 +10,8 @@ multiples of the same rows, without their part in it::
                [  boundary     boundary     boundary ]
                [  border       border       border   ]
 
-Of a matrix in S segments each has its own relations, from its first point on; the condensed matrix has S n rows R, which relate
-the points where segments begin or end, as in `contin.linalg.elimination`.
+Of a matrix in S segments each has its own relations, from its first point on, and its own share of the border; the condensed
+matrix has n rows R of each, by the points where segments begin or end, as drawn in `contin.linalg.elimination`.
 
 This matrix is singular where the whole one is, with a kernel of the same dimension, and has (S + 1) n + k rows.
 """
@@ -80,33 +80,29 @@ def relate_ends(
                     span[i, b] = block[n + i, n + b]
                 orthonormalize_row(span, i)
             number += 1
+        span, border = relations[number - 1], carried[s, n:]
         for i in range(n):
-            _put_row(condensed[s * n + i], relations[number - 1, i], s * n, end + n, n)
-            if s > 0:
-                orthonormalize_row(condensed, s * n + i)
+            _add_row(condensed[s * n + i], span[i], 1.0, s * n, end + n, n)
+        for i in range(height - n):
+            row = condensed[end + conditions + i]
+            _add_row(row, border[i], 1.0, s * n, end + n, n)
+            for k in range(n):
+                _add_row(row, span[k], -_product(border[i], span[k]), s * n, end + n, n)
     for i in range(conditions):
         row = condensed[end + i]
         for b in range(n):
             row[b] = first[i, b]
         for b in range(width - n):
             row[end + b] = last[i, b]
-    for i in range(height - n):
-        row = condensed[end + conditions + i]
-        for s in range(segments):
-            _put_row(row, carried[s, n + i], s * n, end + n, n)
-        for k in range(end):
-            product = _product(row, condensed[k])
-            for b in range(size):
-                row[b] -= product * condensed[k, b]
 
 
 @helper
-def _put_row(row, part, left, right, n):
-    """Add a row by [first point | last point | parameters] of a segment to a row of the condensed matrix."""
+def _add_row(row, part, factor, left, right, n):
+    """Add a multiple of a row by [first point | last point | parameters] of a segment to a row of the condensed matrix."""
     for b in range(2 * n):
-        row[left + b] += part[b]
+        row[left + b] += factor * part[b]
     for b in range(part.size - 2 * n):
-        row[right + b] += part[2 * n + b]
+        row[right + b] += factor * part[2 * n + b]
 
 
 @helper
@@ -162,7 +158,7 @@ def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Mat
             quotient[i, b] = before.condensed[i, b]
             work[i, b] = 0.0 if i < related else after.condensed[i, b]
     for i in range(related):
-        for k in range(related):
+        for k in range(i - i % n, i - i % n + n):
             product = _product(before.condensed[i], after.condensed[k])
             for b in range(size):
                 work[i, b] += product * after.condensed[k, b]
@@ -286,10 +282,10 @@ def relations_of(
 def compared(before: Relations, after: Relations) -> tuple[Array, float]:
     """Return the quotient after^-1 before of the condensed matrices at two points, and the largest turn.
 
-    The rows that relate the ends at the second point are the projections of those at the first one to their span there, so
-    that both matrices have the same rows. The turn is the largest sum, over the mesh points, of the squared sines of the angles
-    between the two spans of relations; infinity where a span has turned to its other side, as where a mode that no end feels
-    becomes singular inside.
+    The rows that relate the ends at the second point are the projections of those at the first one to their span there, segment
+    by segment, so that both matrices have the same rows. The turn is the largest sum, over the mesh points, of the squared
+    sines of the angles between the two spans of relations; infinity where a span has turned to its other side, as where a mode
+    that no end feels becomes singular inside.
     """
     quotient, work = np.empty((2, *before.condensed.shape))
     turn = divide_ends(before, after, quotient, work)
