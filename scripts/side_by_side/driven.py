@@ -301,11 +301,15 @@ def demos() -> list[Demo]:
                 "shooting with SciPy's DOP853."),
         Demo("abcb", "branch points of cycles in a reactor", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
-            Part([1], abcb_cycles, {"PAR(1)": "d", "PERIOD": "period"}),
+            Part([1], abcb_cycles, {"PAR(1)": "d", "PERIOD": "period"}, known=[
+                # the linearized map less one, bordered by the field, is singular: shooting, SciPy's DOP853
+                ("LP", {"PAR(1)": 0.2136973572729, "PERIOD": 7.611039746732}),
+                ("LP", {"PAR(1)": 0.2119032667268, "PERIOD": 8.289204906161}),
+            ]),
             Part([3, 4], abcb_folds, {"PAR(2)": "alpha", "PAR(1)": "d", "PERIOD": "period"}, also={"CP": "LP"}),
         ], note="AUTO passes the Hopf point at d = 0.3462, which it calls a fold, and comes back; contin's cycles end there. "
                 "The turn of the curve of folds at alpha = 1.2687 is a cusp. The curve of branch points in three parameters "
-                "labels regular points only."),
+                "labels regular points only. Third method: shooting with SciPy's DOP853."),
         Demo("lcbp", "a curve of branch points of cycles", [
             Part([0], lcbp, {"PAR(1)": "p1", "PERIOD": "period"}, known=[("BP", {"PAR(1)": 2.0, "PERIOD": 1.0})]),
         ], note="The curves of branch points label regular points, and one in which the circles shrink to nothing."),
