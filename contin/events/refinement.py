@@ -268,7 +268,7 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     beside = at(ROUGH)
     best, other = (0.0, value, here), (ROUGH, test.function(beside), beside)
     if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:
-        return here, ROUGH  # the parameter stands still all around: its value there is that of the fold
+        return here, _stands_still_to(lambda s: test.function(at(s)))  # its value there is that of the fold
     slope, blurred = abs(other[1] - value) / ROUGH, [0.0]
     for _ in range(MOST_UPDATES):
         best, other = sorted((best, other), key=lambda place: abs(place[1]))
@@ -287,6 +287,14 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     if len(blurred) > _BLURRED and max(blurred) < slope * ROUGH:
         return best[2], max(blurred) / slope
     return here, _known_to(lambda s: test.function(at(s)))
+
+
+def _stands_still_to(function: Callable[[float], float]) -> float:
+    """Return the distance at which a parameter no longer stands still on either side, or as far as is looked."""
+    apart = ROUGH
+    while apart < _AWAY and min(abs(function(-apart)), abs(function(apart))) < CORRECTED:
+        apart *= _WIDER
+    return apart
 
 
 def _known_to(function: Callable[[float], float]) -> float:

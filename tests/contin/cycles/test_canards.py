@@ -47,6 +47,8 @@ def test_no_fold_where_the_parameter_stands_still(e):
 def test_a_fold_in_an_explosion():
     """A subcritical Hopf point, stable relaxation oscillations behind: one fold, the parameter known to 1e-9, the period not.
 
+    With other roundings the fold is found at 76 or at 96: the parameter stands still from 60 on, to 1e-12.
+
     The multiplier in the explosion is larger than 1e5: cycles that leave the Hopf point are unstable up to the fold.
     """
     hopf, branch = cycles(0.05, -0.6)
@@ -54,8 +56,7 @@ def test_a_fold_in_an_explosion():
     (fold,) = branch.labelled("LP")
     assert [point.label for point in branch if point.label] == ["HB", "LP", "EP"]
     assert fold.errors["a"] < 1e-8 and 1 < fold.errors["period"] < 60
-    before = [point for point in branch if point.arclength < fold.arclength and not point.label]
-    before = [point for point in before if point["period"] < fold["period"] - fold.errors["period"]]
+    before = [point for point in branch if point.arclength < fold.arclength and not point.label and point["period"] < 50]
     assert {point.floquet().unstable for point in before} == {1}
     assert branch.points[-1].floquet().unstable == 0
 
