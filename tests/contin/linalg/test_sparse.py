@@ -70,7 +70,7 @@ def test_a_large_problem_is_kept_sparse_and_has_the_fold_of_the_dense_one(monkey
     found = fold(250)
     assert found.system.is_sparse
     assert abs(found["lam"] - 3.513830719125161) < 10 / 250**2
-    monkeypatch.setattr(algebraic, "_MANY", 1000)
+    monkeypatch.setattr(algebraic, "MANY", 1000)
     dense = fold(250)
     assert not dense.system.is_sparse
     assert abs(found["lam"] - dense["lam"]) < 1e-11
