@@ -362,7 +362,7 @@ class BoundaryEquations(OnMesh):
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
-        return workspace(self, rows, self._segments(0)) if not is_large(numbers) else None
+        return workspace(self, rows) if not is_large(numbers) else None
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""

@@ -80,11 +80,12 @@ def put_free(mesh: Mesh, values: Values, x: Array) -> None:
         values.p[mesh.free[i]] = x[mesh.states + i]
 
 
-def workspace(system: Any, rows: int, whole: Share) -> Workspace:
+def workspace(system: Any, rows: int) -> Workspace:
     """Return the work space of a system on a mesh with so many linear conditions besides, which each call fills."""
     n, field, ends = system._n, system._field, system._boundary
     of_field, of_ends = system._columns
     codes = Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
+    whole = system._segments(0)
     mesh = Mesh(
         system._layout, system.tables, system._h, system.gauss_times, system._free, system.state_size, system._conditions, whole
     )

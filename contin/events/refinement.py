@@ -290,8 +290,8 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
 
 
 def _stands_still_to(function: Callable[[float], float]) -> float:
-    """Return the distance at which a parameter no longer stands still on either side, or as far as is looked."""
-    apart = ROUGH
+    """Return the distance beyond `ROUGH` at which a parameter no longer stands still on either side, or as far as is looked."""
+    apart = _WIDER * ROUGH
     while apart < _AWAY and min(abs(function(-apart)), abs(function(apart))) < CORRECTED:
         apart *= _WIDER
     return apart

@@ -274,7 +274,7 @@ def _place_interval(target, block, border, offsets, ends, right):
 def _eliminate_point(block, carried, pivots):
     """Eliminate a mesh point from the rows that contain it; return the sign of the product of pivots.
 
-    These rows are the ``carried`` ones, those of what follows (an interval or a segment), which stand in the last n + r rows of
+    These rows are the ``carried`` ones, those of the interval that follows, which stand in the last n + r rows of
     the ``block``, and the border, where both are added; before and after::
 
                        this point  first  next  parameters         this point  first  next  parameters

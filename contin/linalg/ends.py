@@ -40,21 +40,18 @@ class Relations(NamedTuple):
     sides : ndarray, shape (N - S,)
         On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
     condensed : ndarray, shape ((S + 1) n + k, (S + 1) n + k)
-        The condensed matrix.
-    others : int
-        How many of its rows are boundary conditions and border.
+        The condensed matrix: S n rows R, boundary conditions and border.
     """
 
     relations: Stack
     sides: Vector
     condensed: Matrix
-    others: int
 
     @classmethod
     def unfilled(cls, intervals: int, n: int, k: int, segments: int) -> Relations:
         """Return room for those of a matrix with so many parameters."""
         points, size = intervals - segments, (segments + 1) * n + k
-        return cls(np.empty((points, n, 2 * n + k)), np.empty(points), np.empty((size, size)), n + k)
+        return cls(np.empty((points, n, 2 * n + k)), np.empty(points), np.empty((size, size)))
 
 
 @kernel
@@ -63,7 +60,7 @@ def relate_ends(
     found: Relations,
 ) -> None:  # fmt: skip
     """Fill in relations, by the arguments of `relations_of`."""
-    relations, sides, condensed, _ = found
+    relations, sides, condensed = found
     (conditions, n), segments, (_, height, width), rows = first.shape, starts.size - 1, carried.shape, factors.local.shape[1]
     end, size, number = segments * n, condensed.shape[0], 0
     for i in range(size):
@@ -139,9 +136,9 @@ def _product(one, other):
 @kernel
 def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
     """Fill the ``quotient`` ((S + 1) n + k squared), and return the largest turn, both described in `compared`."""
-    points, n, _ = before.relations.shape
+    points, n, width = before.relations.shape
     size = before.condensed.shape[0]
-    largest, related = 0.0, size - before.others
+    largest, related = 0.0, size - (width - n)
     for j in range(points):
         total = float(n)
         for i in range(n):

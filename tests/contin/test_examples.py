@@ -24,7 +24,7 @@ def test_examples(name, tmp_path, monkeypatch):
     "want, got, same",
     [
         ("-3.0", "-2.9999999999999996", True),
-        ("-3.0", "-2.99999999999", False),
+        ("-3.0", "-2.999999999999", False),
         ("-3.0", "-3.0, 1", False),
         ("3", "4", False),
         ("2.5", "2.6", False),
