@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
 from contin.arrays import Array
 
+#: ``CONTIN_DRAWS=1`` (2, 3, ...) in the environment changes every seed: labels must be the same, and values within their errors.
+_SEED = int(os.environ.get("CONTIN_DRAWS") or 0)
 #: Draws of round-off: numbers are computed again with random signs of a unit in the last place. The largest change of three is
 #: seldom below half of what is usual, and at least half of that of ten.
 DRAWS = 3
@@ -17,9 +21,9 @@ PLACES = 5
 ASIDE = 0.1
 
 
-def generator(name: str) -> np.random.Generator:
-    """Return a generator of random numbers, the same ones for a name (that of the module), so that runs repeat bit for bit."""
-    return np.random.default_rng([*name.encode()])
+def generator(word: str) -> np.random.Generator:
+    """Return a generator of random numbers whose seed is a word, so that runs repeat bit for bit."""
+    return np.random.default_rng([_SEED, *word.encode()])
 
 
 def signs(random: np.random.Generator, like: Array) -> Array:

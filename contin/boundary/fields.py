@@ -208,7 +208,7 @@ class Fields(Spectral, Collocation):
         ProblemError
         """
         batch, states, sizes = self.problem.batch("rates"), self.states_at_gauss_points(x), self.scales.states
-        rates = generator(__name__).uniform(1, 2, states.shape)
+        rates = generator("fields").uniform(1, 2, states.shape)
 
         def values(w: Array) -> Array:
             at = self.gauss_times, np.hstack([states, w * sizes]), np.empty((0, 2 * self._n)), self.all_parameters(x)

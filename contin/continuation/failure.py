@@ -79,7 +79,7 @@ def _bend(state: State, length: float) -> tuple[float, float]:
     system, x, way = state.system, state.x, length * state.tangent
     here = system.residual(x)
     forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
-    across = generator(__name__).standard_normal(system.size)
+    across = generator("failure").standard_normal(system.size)
     across *= length / np.sqrt(inner(system, across, across))
     usual = system.residual(x + across) - here
     return float(np.max(np.abs(forth + back), initial=0.0)), float(np.max(np.abs(usual), initial=0.0))

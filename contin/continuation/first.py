@@ -102,7 +102,7 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
     """
     fixed = np.zeros(system.size)
     fixed[system.parameter_index(primary)] = 1.0
-    across = generator(__name__).standard_normal(system.size) * np.sqrt(system.weights)
+    across = generator("first").standard_normal(system.size) * np.sqrt(system.weights)
     failed: ConvergenceError | None = None
     beside = x + APART * across / np.abs(across).max()  # of a branch point, where both are singular
     for start, row in ((x, fixed), (x, across), (beside, across)):

@@ -122,7 +122,7 @@ class _FirstPoint:
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
         self.tangent = np.zeros_like(x) if self._stands_still(rate) else linear.tangent / rate
-        self._random = draws.generator(__name__)
+        self._random = draws.generator("scaling")
         self._others: list[tuple[Array, Any, float]] = []
 
     def _stands_still(self, rate: float) -> bool:

@@ -354,7 +354,7 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
     """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
-    random, noise = draws.generator(__name__), np.zeros_like(x)
+    random, noise = draws.generator("newton"), np.zeros_like(x)
     residual, factors = system.linearize(x, rows)
     for _ in range(draws.DRAWS):
         rounded = draws.rounded(random, x)

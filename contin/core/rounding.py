@@ -22,7 +22,7 @@ def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: C
     ``again(signs)`` computes them again; ``signs(array)`` are random signs of the shape of an array. Imaginary parts are alike
     up to multiples of ``full``.
     """
-    random, found = draws.generator(__name__), np.zeros(len(values))
+    random, found = draws.generator("rounding"), np.zeros(len(values))
     for _ in range(draws.DRAWS):
         gaps = values[:, None] - again(lambda array: draws.signs(random, array))
         imaginary = gaps.imag if full == math.inf else (gaps.imag + full / 2) % full - full / 2

@@ -58,7 +58,7 @@ class Collocated:
         n = system.states_count
         # In general position to the states at both ends that the equations admit: with ten seeds, a normal form at 16 states
         # changes by 1e-13 of its value.
-        rows = np.linalg.qr(generator(__name__).standard_normal((2 * n, n)))[0].T
+        rows = np.linalg.qr(generator("round").standard_normal((2 * n, n)))[0].T
         self._factors = system.with_conditions(x, rows)
         self.inside = system.state_size - n
         right = np.zeros((n, system.state_size))

@@ -67,7 +67,7 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
     of_state: Any = namedtuple("U", names)  # type: ignore[misc]  # noqa: PYI024
     of_parameters: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
     p = of_parameters(**parameters)
-    for u in generator(__name__).uniform(-1, 1, (PLACES, len(names))):
+    for u in generator("symmetry").uniform(-1, 1, (PLACES, len(names))):
         try:
             first, turned = (np.array(field(of_state(*map(float, v)), p), dtype=float) for v in (u, matrix @ u))
         except (ArithmeticError, ValueError):

@@ -68,7 +68,7 @@ class EventCurve(Defining):
 
     def computed(self, x: Array) -> _Solutions:
         """Return the solutions of F = 0 around x; rows Phi are those that are kept, as long as they fit."""
-        rows = generator(__name__).standard_normal((self.size - self.base.equations, self.size))
+        rows = generator("event curve").standard_normal((self.size - self.base.equations, self.size))
         found = self._solved(x, rows if self.borders is None else self.borders)
         if self.borders is None or not rows_fit(found.tangents, self.weights):
             self.borders = orthonormal(found.tangents, self.weights) * self.weights

@@ -54,7 +54,7 @@ def conservation_laws(problem: Any) -> Array:
     none = np.empty((0, n))
     if not problem.dynamics or n > MOST_STATES:
         return none
-    random = generator(__name__)
+    random = generator("dependence")
     columns: list[Array] = []
     for size in _SIZES:
         p = {name: value + ASIDE * (1 + abs(value)) * random.uniform(0.1, 1.0) for name, value in problem.parameters.items()}
@@ -77,7 +77,7 @@ def conservation_laws(problem: Any) -> Array:
 
 def _around(system: AlgebraicEquations, x: Array) -> list[Array]:
     """Return places near x where the equations are defined; above x first, where logarithms and roots are."""
-    random, found = generator(__name__), []
+    random, found = generator("dependence"), []
     for sign in np.repeat((1.0, -1.0), PLACES):
         place = x + sign * ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
         with contextlib.suppress(ArithmeticError, ValueError):

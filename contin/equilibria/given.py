@@ -40,7 +40,7 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
         return
     problem.compared.append(True)
     batch, none = problem.batch("residual"), np.empty((0, u.size))
-    random, size = generator(__name__), 1 + np.abs(u)
+    random, size = generator("given"), 1 + np.abs(u)
     place = u + ASIDE * size * random.uniform(-1, 1, u.size)
     direction = size * random.uniform(0.5, 1.0, u.size) * signs(random, u)
 

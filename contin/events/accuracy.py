@@ -37,7 +37,7 @@ class _Bordered:
     """Factors of [[F_x, c], [row, 0], [r, 0]] at a simple branch point, for right-hand sides of [F_x; row]."""
 
     def __init__(self, trial: Trial) -> None:
-        system, random = trial.system, generator(__name__)
+        system, random = trial.system, generator("accuracy")
         self._size = system.size
         rows = np.zeros((2, system.size + 1))
         rows[0, :-1] = system.weights * trial.tangent

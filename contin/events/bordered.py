@@ -97,7 +97,7 @@ class BorderedMatrix:
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
     """Return borders made of null vectors at x: of those that random borders give, or rows about the ``kernel``."""
-    random = generator(__name__)
+    random = generator("bordered")
     phi = orthonormal(random.standard_normal((2, system.size)) if kernel is None else kernel, system.weights)
     matrix = BorderedMatrix(system, x, phi, random.standard_normal(system.equations) / np.sqrt(system.equations))
     if not np.isfinite(matrix.kernel).all():

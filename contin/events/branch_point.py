@@ -210,7 +210,7 @@ def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> A
     >>> bool(np.all(rounded_off(system, found, Newton()) < 1e-15))
     True
     """
-    random, noise = draws.generator(__name__), np.zeros_like(point.x)
+    random, noise = draws.generator("branch point"), np.zeros_like(point.x)
     with np.errstate(all="ignore"):
         search = _Search(system, point.x, newton, point.kernel)
         for _ in range(draws.DRAWS):

@@ -47,7 +47,7 @@ class Coefficient:
         value, size = float(best.sum().real), float(np.abs(best).sum())
 
         def estimate() -> float:
-            random, changes = draws.generator(__name__), []
+            random, changes = draws.generator("coefficient"), []
             for _ in range(draws.DRAWS):
                 moved = x + ROUND_OFF * (1 + np.abs(x)) * draws.signs(random, x)
                 changes.append(abs(value - float(terms(moved).sum().real)))

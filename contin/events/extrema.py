@@ -56,7 +56,7 @@ class Stationarity:
     def __init__(self, system: System, x: Array, column: str, held: Sequence[int] = (), phi: Array | None = None) -> None:
         count = system.size - system.equations - len(held)
         if phi is None:
-            phi = generator(__name__).standard_normal((count, system.size))
+            phi = generator("extrema").standard_normal((count, system.size))
         rows = np.zeros((len(held) + count, system.size))
         rows[np.arange(len(held)), list(held)] = 1.0
         rows[len(held) :] = phi

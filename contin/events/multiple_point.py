@@ -320,7 +320,7 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     manifold.at(s)
     second, linear = manifold.second()
     quadratic = manifold.third(second) / 2
-    random = generator(__name__)
+    random = generator("multiple point")
     starts = random.standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
     outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)

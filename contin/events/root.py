@@ -88,7 +88,10 @@ def find_zero(
         if best[0] <= small and (idle == 2 or course.scatters):
             return best[1]
         # It stands still as for an exponential function seen from where that is flat.
-        c = (a + b) / 2 if course.closed_to > 0.5 and move > _IDLE * tolerance and abs(fc) > least / 2 else following
+        c = following
+        if course.stands_still and move > _IDLE * tolerance and abs(fc) > least / 2:
+            c = (a + b) / 2
+            course.bisect()
     if best[0] <= CORRECTED * small:  # a zero of a higher order, to which values fall slowly
         return best[1]
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
@@ -113,23 +116,27 @@ class _Course:
 
     Attributes
     ----------
-    closed_to : float
-        Part to which it has closed since; NaN where that is not long ago.
+    stands_still : bool
+        It has not closed to half of its width since.
     scatters : bool
         Values are round-off: the bracket closes, and they are alike at both ends, where a jump may have a flat side.
     """
 
     def __init__(self, width: float, value: float) -> None:
-        self._width, self._value, self._often = width, value, 0
-        self.closed_to, self.scatters = math.nan, False
+        self._width, self._value, self._often, self._patience = width, value, 0, _OFTEN
+        self.stands_still = self.scatters = False
 
     def go_on(self, width: float, smaller: float, larger: float) -> None:
         """Take the next bracket."""
         self._often += 1
         if larger < self._value / 2:
             self._width, self._value, self._often = width, larger, 0
-        self.closed_to = width / self._width if self._often >= _OFTEN else math.nan
-        self.scatters = self.closed_to < _NOISY and smaller > _ALIKE * larger
+        self.stands_still = self._often >= self._patience and width > self._width / 2
+        self.scatters = self._often >= _OFTEN and width < _NOISY * self._width and smaller > _ALIKE * larger
+
+    def bisect(self) -> None:
+        """Bisect after fewer evaluations from now on: of two zeros that are close, seen from afar, this is what comes nearer."""
+        self._patience = max(self._patience // 2, 1)
 
 
 def _interpolated(known: list[Value], otherwise: float) -> float:

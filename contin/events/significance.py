@@ -68,7 +68,7 @@ def _noise(trial: Trial, fold: Event) -> float:
     size, own = (float(np.linalg.norm(vector[: system.state_size])) for vector in (x, tangent))
     if not size:
         return 0.0
-    random, noise, at = draws.generator(__name__), 0.0, system.parameter_index(fold.name)
+    random, noise, at = draws.generator("significance"), 0.0, system.parameter_index(fold.name)
     residual, factors = system.linearize(x, (system.weights * tangent,))
     for _ in range(draws.DRAWS):
         error = system.residual(draws.rounded(random, x)) - residual

@@ -207,7 +207,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
     Unrecordable
         They differ.
     """
-    random = generator(__name__)
+    random = generator("recording")
     for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1

@@ -121,7 +121,7 @@ def null_vectors(
         Returns the left and the right null vector, which may be complex.
     """
     if borders is None:
-        random = generator(__name__)
+        random = generator("border")
         borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
     found, root = bordered(*borders), np.sqrt(weights)
     for _ in range(_ROUNDS):

@@ -97,7 +97,7 @@ def product_of(count: int, n: int) -> Product:
 @functools.lru_cache(maxsize=32)
 def _first_basis(n: int) -> Array:
     """Return an orthogonal matrix to start from, always the same."""
-    basis: Array = np.ascontiguousarray(np.linalg.qr(generator(__name__).standard_normal((n, n)))[0].T)
+    basis: Array = np.ascontiguousarray(np.linalg.qr(generator("periodic").standard_normal((n, n)))[0].T)
     return basis
 
 

@@ -111,7 +111,7 @@ def nearest_of(inverse: Function, n: int, value: complex) -> complex:
     """Return the same of an operator A that is known by its inverses: ``inverse(s)`` is the function v -> (A - s)^-1 v."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-    start = generator(__name__).standard_normal(n).astype(complex)
+    start = generator("rightmost").standard_normal(n).astype(complex)
     try:
         operator = LinearOperator((n, n), inverse(complex(value)), dtype=complex)
     except RuntimeError:  # exactly singular
@@ -132,7 +132,7 @@ def _transformed(inverse: Function, n: int, pole: float, zero: float, count: int
     except RuntimeError:  # exactly singular
         return np.empty(0, dtype=complex)
     operator = LinearOperator((n, n), lambda v: v + (pole + zero) * solve(v) if zero else solve(v), dtype=float)
-    start = generator(__name__).standard_normal(n)
+    start = generator("rightmost").standard_normal(n)
     options = {"ncv": min(_SPACE * count, n), "maxiter": _COUNT, "tol": CORRECTED, "return_eigenvectors": False}
     try:
         values: Any = eigs(operator, min(count, n - 2), v0=start, **options)

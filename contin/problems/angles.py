@@ -105,7 +105,7 @@ def check_periodic(
     ------
     ProblemError
     """
-    names, random = batch.signature.states, generator(__name__)
+    names, random = batch.signature.states, generator("angles")
     u = random.uniform(-1, 1, (PLACES, len(names)))
     t, none = random.uniform(0, 1, PLACES), np.empty((0, len(names)))
     defaults = np.array(list(parameters.values()), dtype=float)

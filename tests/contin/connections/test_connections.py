@@ -249,7 +249,12 @@ def test_a_pulse_keeps_its_place_for_any_time(length):
     for point in branch:
         s = length * (point.system.mesh - 0.5)
         a, states = point["a"], point.system.states(point.x)[:: point.system.degree].T
-        assert abs(point["c"]) < 1e-10 and states == pytest.approx(pulse(s, a), abs=1e-7)
+        along_itself = (pulse(s + 1e-4, a) - pulse(s - 1e-4, a)) / 2e-4
+        off = states - pulse(s, a)
+        shift = np.vdot(off, along_itself) / np.vdot(along_itself, along_itself)
+        assert abs(point["c"]) < 1e-10 and off == pytest.approx(shift * along_itself, abs=1e-10)
+        # nothing but the first guess, on its mesh, tells where the pulse is: not the equations, whose solution is known to 1e-12
+        assert abs(shift) < 1e-5
         by_a = (pulse(s, a + 1e-4) - pulse(s, a - 1e-4)) / 2e-4
         along = point.system.states(point.tangent)[:: point.system.degree].T
         tangent = along / point.tangent[point.system.parameter_index("a")]

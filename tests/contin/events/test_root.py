@@ -137,6 +137,19 @@ def test_a_small_step_before_a_jump_is_no_zero():
     assert find_zero(lambda x: 1e-10 - x, (0.0, 1e-10), (1.0, -1.0), 1e-14) == pytest.approx(1e-10, rel=1e-6)
 
 
+@pytest.mark.parametrize("between", [1e-7, 2e-6, 9e-6])
+@pytest.mark.parametrize("noise", [0.0, 1e-16, 1e-15])
+def test_the_second_of_two_close_zeros_seen_from_afar(between, noise):
+    """Edges a_5 and b_5 of Mathieu's equation are 1.4e-5 apart, in a step of 5: secants from the dip stay in the dip."""
+    random = np.random.default_rng(0)
+
+    def function(x):
+        return 0.025 * x * (x - 1.4e-5) + noise * random.uniform(-1, 1)
+
+    found = find_zero(function, (between, function(between)), (0.43, function(0.43)), 1e-12)
+    assert found == pytest.approx(1.4e-5, abs=1e-11 + 2 * noise / (0.025 * 1.4e-5))
+
+
 @pytest.mark.parametrize("size", [1e-300, 1e-170, 1e170, 1e300])
 def test_the_size_of_the_function_makes_no_difference(size):
     """Products of three values would be zero or infinite; the zero is W(1), as above."""
