@@ -8,7 +8,7 @@ import numpy as np
 
 from contin.arrays import Array
 
-#: ``CONTIN_DRAWS=1`` (2, 3, ...) in the environment changes every seed: labels must be the same, and values within their errors.
+#: ``CONTIN_DRAWS=1`` (2, 3, ...) in the environment changes all seeds: labels must be the same, and values within their errors.
 _SEED = int(os.environ.get("CONTIN_DRAWS") or 0)
 #: Draws of round-off: numbers are computed again with random signs of a unit in the last place. The largest change of three is
 #: seldom below half of what is usual, and at least half of that of ten.

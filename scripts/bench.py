@@ -1,7 +1,7 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
     python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [small]
-                            [defaults] [problems] [--quick] [--out DIR] [--before DIR]
+                            [threads] [defaults] [problems] [--quick] [--out DIR] [--before DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -23,7 +23,20 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "small", "defaults", "problems")
+PARTS = (
+    "like-for-like",
+    "fold",
+    "cost",
+    "startup",
+    "many",
+    "stress",
+    "cores",
+    "cycles",
+    "small",
+    "threads",
+    "defaults",
+    "problems",
+)
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -61,27 +74,16 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, options: argparse.Namespace) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
+    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress, threads
 
     from ribbon_model import exact
 
     quick, bifpy_python = options.quick, options.bifpy_python
     if part == "problems":
         return problems.run(quick, options.before, options.before_python)
-    if part == "cost":
-        return cost.run(quick)
-    if part == "startup":
-        return startup.run(quick)
-    if part == "many":
-        return many.run(quick)
-    if part == "stress":
-        return stress.run(quick)
-    if part == "cycles":
-        return cycles.run(quick)
-    if part == "small":
-        return small.run(quick)
-    if part == "defaults":
-        return defaults.run(quick)
+    plain = {each.__name__.partition(".")[2]: each for each in (cost, startup, many, stress, cycles, small, threads, defaults)}
+    if part in plain:
+        return plain[part].run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n
     if part == "cores":
         return cores.run(quick, exact_fold)

@@ -399,7 +399,7 @@ class ConnectionEquations(Conditioned):
         """Return it from solutions of F_x^T y + rows^T m = e for the user's parameters, combined so that no row is left."""
         rows = self.size - self.equations
         if factors is None:
-            _, factors = self.linearize(x, generator("equations").standard_normal((rows, self.size)))
+            _, factors = self.linearize(x, generator("null").standard_normal((rows, self.size)))
         own = [name for name in self.free if name not in self.problem.multipliers]
         units = np.zeros((len(own), self.size))
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
@@ -407,7 +407,7 @@ class ConnectionEquations(Conditioned):
         left = np.linalg.svd(found[:, self.equations :])[0][:, -1]
         w: Array = left @ found[:, : self.equations]
         is_reference = x is self.reference
-        near = generator("equations").standard_normal(w.size) if is_reference else self.left_null_vector(self.reference, factors)
+        near = generator("null").standard_normal(w.size) if is_reference else self.left_null_vector(self.reference, factors)
         return w * (math.copysign(1.0, w @ near) / np.linalg.norm(w))
 
     def slow_motion(self, x: Array) -> tuple[Array, float]:

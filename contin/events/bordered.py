@@ -96,10 +96,16 @@ class BorderedMatrix:
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
-    """Return borders made of null vectors at x: of those that random borders give, or rows about the ``kernel``."""
+    """Return borders made of null vectors at x: those that random borders give, improved once, or rows about the ``kernel``.
+
+    Where x is not at a branch point, the second null vector depends on the borders: random ones may be nearly normal to it.
+    """
     random = generator("bordered")
-    phi = orthonormal(random.standard_normal((2, system.size)) if kernel is None else kernel, system.weights)
-    matrix = BorderedMatrix(system, x, phi, random.standard_normal(system.equations) / np.sqrt(system.equations))
-    if not np.isfinite(matrix.kernel).all():
-        raise ConvergenceError("no branch point near by: the bordered matrix is singular")
-    return orthonormal(matrix.kernel, system.weights), matrix.left()
+    rows, left = kernel, random.standard_normal(system.equations) / np.sqrt(system.equations)
+    for _ in range(2 if kernel is None else 1):
+        rows = random.standard_normal((2, system.size)) if rows is None else rows
+        matrix = BorderedMatrix(system, x, orthonormal(rows, system.weights), left)
+        if not np.isfinite(matrix.kernel).all():
+            raise ConvergenceError("no branch point near by: the bordered matrix is singular")
+        rows, left = matrix.kernel, matrix.left()
+    return orthonormal(matrix.kernel, system.weights), left

@@ -88,10 +88,8 @@ def find_zero(
         if best[0] <= small and (idle == 2 or course.scatters):
             return best[1]
         # It stands still as for an exponential function seen from where that is flat.
-        c = following
-        if course.stands_still and move > _IDLE * tolerance and abs(fc) > least / 2:
-            c = (a + b) / 2
-            course.bisect()
+        halve = move > _IDLE * tolerance and abs(fc) > least / 2 and course.bisects()
+        c = (a + b) / 2 if halve else following
     if best[0] <= CORRECTED * small:  # a zero of a higher order, to which values fall slowly
         return best[1]
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
@@ -116,27 +114,27 @@ class _Course:
 
     Attributes
     ----------
-    stands_still : bool
-        It has not closed to half of its width since.
     scatters : bool
         Values are round-off: the bracket closes, and they are alike at both ends, where a jump may have a flat side.
     """
 
     def __init__(self, width: float, value: float) -> None:
         self._width, self._value, self._often, self._patience = width, value, 0, _OFTEN
-        self.stands_still = self.scatters = False
+        self._stands_still = self.scatters = False
 
     def go_on(self, width: float, smaller: float, larger: float) -> None:
         """Take the next bracket."""
         self._often += 1
         if larger < self._value / 2:
             self._width, self._value, self._often = width, larger, 0
-        self.stands_still = self._often >= self._patience and width > self._width / 2
+        self._stands_still = self._often >= self._patience and width > self._width / 2
         self.scatters = self._often >= _OFTEN and width < _NOISY * self._width and smaller > _ALIKE * larger
 
-    def bisect(self) -> None:
-        """Bisect after fewer evaluations from now on: of two zeros that are close, seen from afar, this is what comes nearer."""
-        self._patience = max(self._patience // 2, 1)
+    def bisects(self) -> bool:
+        """Return whether the bracket is halved; if so, sooner the next time: two zeros may be close, seen from afar."""
+        if self._stands_still:
+            self._patience = max(self._patience // 2, 1)
+        return self._stands_still
 
 
 def _interpolated(known: list[Value], otherwise: float) -> float:

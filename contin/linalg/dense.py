@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.linalg.small import factor_matrix, solve_rows
 from contin.linalg.spectrum import fill_eigenvalues
 
-#: Number of rows up to which the kernel is faster than LAPACK: ten times for three, twice for sixty, as fast for 150.
+#: Number of rows up to which kernels are used, which start no threads: one solution of a small system with those of BLAS takes
+#: 7 ms of the processor where other processes run. Eigenvalues are found faster than by LAPACK, ten times for three rows, twice
+#: for sixty; factors twice as fast up to fifty rows, half as fast for a hundred.
 _SMALL = 100
 
 
@@ -80,10 +83,17 @@ class DenseFactors:
         #: The matrix itself.
         self.matrix = matrix
         self._is_complex = np.iscomplexobj(matrix)
-        self._lu, self._exchanges, zero_pivot = (_lapack().zgetrf if self._is_complex else _lapack().dgetrf)(matrix)
-        self._singular = zero_pivot > 0
+        self._is_small = not self._is_complex and len(matrix) <= _SMALL
+        if self._is_small:
+            self._lu, self._exchanges = np.empty(matrix.shape), np.empty(len(matrix), dtype=np.int64)
+            sign = factor_matrix(np.ascontiguousarray(matrix, dtype=float), self._lu, self._exchanges)
+            self._singular = sign == 0
+        else:
+            self._lu, self._exchanges, zero_pivot = (_lapack().zgetrf if self._is_complex else _lapack().dgetrf)(matrix)
+            self._singular = zero_pivot > 0
+            sign = self._sign() if not self._is_complex and np.isfinite(matrix).all() else np.nan
         #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite or complex.
-        self.sign = self._sign() if not self._is_complex and np.isfinite(matrix).all() else np.nan
+        self.sign = sign
 
     def _sign(self) -> float:
         """Return the sign of the product of the pivots, times -1 for each exchange of rows."""
@@ -111,5 +121,11 @@ class DenseFactors:
         b = np.asarray(b)
         if self._singular:
             return np.full(b.shape, np.nan)
+        if self._is_small and not np.iscomplexobj(b):
+            rows = np.array(b, dtype=float, order="C", ndmin=2)
+            solve_rows(self._lu, self._exchanges, rows, int(transposed))
+            return rows.reshape(b.shape)
+        if self._is_small:
+            return np.asarray(self._solved(b.real, transposed) + 1j * self._solved(b.imag, transposed))
         solve = _lapack().zgetrs if self._is_complex else _lapack().dgetrs
         return np.ascontiguousarray(solve(self._lu, self._exchanges, b.T, trans=transposed)[0].T)

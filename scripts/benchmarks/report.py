@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
+from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress, threads
 from contin.lowlevel import PALETTE
 
 TITLES = {
@@ -20,6 +20,7 @@ TITLES = {
     "cores": "Two cores",
     "cycles": "Cycles",
     "small": "Small problems",
+    "threads": "Threads of BLAS",
     "defaults": "Default degree",
     "problems": "New problems",
 }
@@ -33,6 +34,7 @@ TABLES = {
     "cores": cores.table,
     "cycles": cycles.table,
     "small": small.table,
+    "threads": threads.table,
     "defaults": defaults.table,
     "problems": problems.table,
 }

@@ -253,7 +253,7 @@ def test_a_pulse_keeps_its_place_for_any_time(length):
         off = states - pulse(s, a)
         shift = np.vdot(off, along_itself) / np.vdot(along_itself, along_itself)
         assert abs(point["c"]) < 1e-10 and off == pytest.approx(shift * along_itself, abs=1e-10)
-        # nothing but the first guess, on its mesh, tells where the pulse is: not the equations, whose solution is known to 1e-12
+        # only the first guess, on its mesh, tells where the pulse is, and not the equations
         assert abs(shift) < 1e-5
         by_a = (pulse(s, a + 1e-4) - pulse(s, a - 1e-4)) / 2e-4
         along = point.system.states(point.tangent)[:: point.system.degree].T
