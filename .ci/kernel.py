@@ -1,4 +1,4 @@
-"""Print which kernel OpenBLAS uses here; with ``--other``, the name of one that rounds differently, empty if there is none.
+"""Print which kernel OpenBLAS uses here; with ``--other N``, the N-th of those that round differently, empty if there is none.
 
 The names are values of OPENBLAS_CORETYPE.
 """
@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 
-#: OpenBLAS's kernels that need AVX-512.
-WIDE = "SkylakeX", "Cooperlake", "SapphireRapids"
+#: OpenBLAS's kernels that round differently, with what a processor must have for them.
+NEEDS = {"SkylakeX": "avx512vl", "Zen": "avx2", "Haswell": "avx2", "Sandybridge": "avx", "Prescott": "pni"}
 
 
 def kernel() -> str:
@@ -26,21 +26,17 @@ def kernel() -> str:
     return ""
 
 
-def has_avx512() -> bool:
-    """Return whether the processor has AVX-512, as far as the system tells."""
+def others(used: str) -> list[str]:
+    """Return the other kernels that this processor runs, as far as the system tells."""
     flags = pathlib.Path("/proc/cpuinfo")
-    return flags.exists() and " avx512f" in flags.read_text()
-
-
-def other(used: str) -> str:
-    """Return a kernel that rounds differently from the one used: Haswell beside SkylakeX; Prescott without AVX-512."""
-    cpuinfo = pathlib.Path("/proc/cpuinfo")
-    if not used or not cpuinfo.exists() or " avx2" not in cpuinfo.read_text():
-        return ""
-    if used in WIDE:
-        return "Haswell"
-    return "SkylakeX" if has_avx512() else "Prescott"
+    known = set(flags.read_text().split()) if used and flags.exists() else set()
+    return [name for name, flag in NEEDS.items() if flag in known and name != used]
 
 
 if __name__ == "__main__":
-    print(other(kernel()) if "--other" in sys.argv else f"OpenBLAS uses its kernel {kernel() or '(not known)'}")
+    used = kernel()
+    if "--other" in sys.argv:
+        names = others(used)
+        print(names[int(sys.argv[-1]) % len(names)] if names else "")
+    else:
+        print(f"OpenBLAS uses its kernel {used or '(not known)'}")

@@ -16,7 +16,7 @@ from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import Reason, State, Stop, standing_at
 from contin.core.trial import Event, Linearization, Trial, linearization
-from contin.draws import generator
+from contin.draws import DRAWS, generator
 from contin.errors import ConvergenceError
 from contin.events.accuracy import accuracy_of
 from contin.events.significance import growing
@@ -102,10 +102,11 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
     """
     fixed = np.zeros(system.size)
     fixed[system.parameter_index(primary)] = 1.0
-    across = generator("first").standard_normal(system.size) * np.sqrt(system.weights)
+    rows = generator("first").standard_normal((DRAWS, system.size)) * np.sqrt(system.weights)
     failed: ConvergenceError | None = None
-    beside = x + APART * across / np.abs(across).max()  # of a branch point, where both are singular
-    for start, row in ((x, fixed), (x, across), (beside, across)):
+    # at a branch point these are singular; beside it a row is, too, that passes two branches at equal distances
+    beside = ((x + APART * row / np.abs(row).max(), row) for row in rows)
+    for start, row in ((x, fixed), (x, rows[0]), *beside):
         try:
             return correct(system, start, row, row @ start, newton, sizes=system.magnitudes).x, row
         except ConvergenceError as error:
