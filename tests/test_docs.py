@@ -73,7 +73,8 @@ def test_blocks_run(page, project):
 
 
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
-@pytest.mark.parametrize("finer", [False, pytest.param(True, marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("finer", [False, True])
 def test_the_page_of_finite_elements_runs(finer):
     """Its folds, beside a series for the cap; ``finer`` is one refinement more."""
     pytest.importorskip("skfem", reason="scikit-fem is not installed (pip install scikit-fem)")

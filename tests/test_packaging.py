@@ -44,6 +44,7 @@ def test_contin_declares_what_it_imports_and_nothing_else():
     assert imported("contin") == {*names(ALONE["project"]["dependencies"]), *names(extras)}
 
 
+@pytest.mark.full
 def test_the_main_distribution_declares_what_it_imports():
     project = BOTH["project"]
     optional = names(sum(project["optional-dependencies"].values(), []))

@@ -286,6 +286,7 @@ def test_a_process_killed_while_it_sends_its_result():
         assert "odd" in str(odd.exception())
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("method", [pytest.param("fork", marks=pytest.mark.forks("they are tested")), "spawn"])
 def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkeypatch, method):
     """Forked, or each from nothing as on Windows and macOS: the same bits as from one process."""

@@ -555,6 +555,7 @@ EXACT = [(law, nu, None) for law in ("ribbon", "flat rod", "isotropic rod") for 
 EXACT += [("finite width", 0.3, 8.0)]
 
 
+@pytest.mark.full
 def test_shapes_of_open_strips_between_those_that_a_file_keeps(tmp_path, root):
     """Each sixth point is kept; beside the fold at shear = 0.2131 two states have one shear, and the right one is found."""
     found = []
@@ -578,6 +579,7 @@ def test_shapes_of_open_strips_are_those_of_their_polynomials(tmp_path):
     assert np.abs(np.abs(places - places[0]) - np.abs(arc)).max() < 2 * TOLERANCE * np.abs(arc).max()
 
 
+@pytest.mark.full
 @needs_chromium
 def test_page_of_a_network(tmp_path, root, browser):
     """Its strips and joints are drawn, its axes chosen, its stages played; a link to a state opens; also without WebGL."""
@@ -658,6 +660,7 @@ def test_compare_with_another_material(pages, browser):
     assert browser.errors == []
 
 
+@pytest.mark.full
 @needs_chromium
 def test_the_exact_solution_of_a_law_of_one_s_own_comes_with_the_page(tmp_path, browser, monkeypatch):
     """Its fold is that of the branch; a law with an omega_2 has no quadrature, and the page says so."""

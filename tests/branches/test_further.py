@@ -52,6 +52,7 @@ def searched(result):
         return places(result, 16)
 
 
+@pytest.mark.full
 def test_the_arch_and_the_shape_of_an_s(searched):
     """The arch to the other side is stable; the S is planar, a saddle, and to either side. The run has neither."""
     (place,) = searched

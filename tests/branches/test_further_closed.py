@@ -40,6 +40,7 @@ def on_the_loop(solution):
     return dict(zip(system.problem.functionals, system.functionals(found)))
 
 
+@pytest.mark.full
 def test_states_of_other_primary_branches(place):
     """The branch (1, 2) joins the circles 1 and 3, and passes 3 twice: four states are known. Others have other wavenumbers."""
     assert (place.law, place.nu, place.kappa_n, place.known) == ("ribbon", 0.3, 3.0, 4)
@@ -60,6 +61,7 @@ def test_every_state_is_one_of_the_whole_loop(place):
         assert again["kappa_star"] == pytest.approx(state.kappa_star, rel=1e-7, abs=1e-7)
 
 
+@pytest.mark.full
 def test_a_state_of_a_secondary_branch():
     """One that leaves (3, 1) at kappa_n = -21.6 and comes back at -114.3: it has a force and one mirror."""
     points = further(RIBBON, {"nu": 0.3}, -60.0, [], [1, 3], 32)

@@ -74,8 +74,11 @@ def _events(branch, label, name, stage=1):
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 RODS = sorted(path.stem for path in CONFIGS.glob("network_*.yaml") if "law: rod" in path.read_text("utf-8"))
-#: Scenes of many strips, which take ten seconds and more.
-LONG = ("network_arches", "network_bigon_ring", "network_hexagon", "network_hexagram")
+#: Scenes of many strips or of long branches.
+LONG = (
+    "network_arch", "network_arches", "network_bigon", "network_bigon_ring", "network_hexagon", "network_hexagram",
+    "network_portal", "network_right_angle",
+)  # fmt: skip
 #: Scene, followed number, and the first special point of its first stage: closed forms, see tests/ribbon_model/test_network.py.
 KNOWN = {
     "network_portal": ("P", "BP", 2.71645974768613**2, (0, 1)),
@@ -102,6 +105,7 @@ def test_shipped_scenes_have_their_closed_forms(shipped, name):
         assert branch.points["floating"].max() < 1e-7
 
 
+@pytest.mark.full
 def test_the_hexagon_as_far_as_its_first_bifurcation(run, root):
     """Where two modes meet; the whole scene takes long, and `tests/ribbon_model/test_network.py` has all its bifurcations."""
     text = (root / "configs" / "network_hexagon.yaml").read_text("utf-8")
@@ -136,6 +140,7 @@ def test_shooting_finds_the_same_states(name, shipped):
             assert place == pytest.approx([float(branch.points[f"{joint_name}_{x}"][row]) for x in "xyz"], abs=1e-9 * size)
 
 
+@pytest.mark.full
 def test_the_determinant_vanishes_where_a_bigon_buckles(shipped):
     """3.682897251: of the flat bigon of 60 degrees, C = .75; central differences leave 1e-8."""
     branch = read_branch(shipped("network_bigon"))
@@ -321,6 +326,7 @@ _CHANGES = [  # of an open strip: what is followed, to which value, what is held
 ]  # fmt: skip
 
 
+@pytest.mark.full
 def test_supports_that_change_are_those_of_open_strips(run):
     """A strip that is pushed, clamped, compressed, and let go twice: the network of one strip is the open strip."""
     stages = [
@@ -359,6 +365,7 @@ stages:
 """
 
 
+@pytest.mark.full
 def test_rollers_that_come_and_go(run):
     """A second roller begins where the strip is, without force; let go one after the other, the strip is straight again."""
     branch = run(ROLLERS)
@@ -402,6 +409,7 @@ stages:
 """
 
 
+@pytest.mark.full
 def test_the_barrier_of_a_buckled_column(run, monkeypatch):
     """From one side to the other over the second mode: the difference of two potentials that the run has located."""
     branch = run(COLUMN)
@@ -419,6 +427,7 @@ def test_the_barrier_of_a_buckled_column(run, monkeypatch):
     assert head == "to leave stable states:" and line.startswith("  P = 85 of stage ")
 
 
+@pytest.mark.full
 def test_the_snap_of_an_arch(run, root, shipped, monkeypatch):
     """Past its fold it falls to the other side: the energy is that of an arch that is drawn there, without the segments."""
     branch = read_branch(shipped("network_arch"))

@@ -243,6 +243,7 @@ def pictures(previews):
     return {law: diagram_figure(graph, law, 0.3) for law, graph in previews.items()}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("law", ["ribbon", "isotropic rod"])
 def test_every_line_of_fig12_has_its_name(law, previews, pictures):
     """In one panel at least; a name stands on no other line, mark or name."""

@@ -185,6 +185,7 @@ def test_a_law_of_one_s_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp
         parse(text.replace("twist: 1.5, ", ""), "scene")
 
 
+@pytest.mark.full
 def test_a_file_with_a_law_is_all_that_commands_need(tmp_path, command):
     """Closed and open strips: at the moment 4 the open one is an arc whose bending y satisfies y + core^2 y^3 = 4."""
     (tmp_path / "quartic.py").write_text(LAW)
@@ -206,6 +207,7 @@ def test_a_file_with_a_law_is_all_that_commands_need(tmp_path, command):
     assert energy == pytest.approx(y**2 / 2 + 0.4**2 * y**4 / 4, rel=1e-9)
 
 
+@pytest.mark.full
 def test_secondary_branches_and_circles_of_a_law_of_one_s_own(tmp_path, monkeypatch):
     """Its branch (3, 1) has a secondary branch that joins two bifurcations; kappa* of its circles is no straight line."""
     (tmp_path / "quartic.py").write_text(LAW)

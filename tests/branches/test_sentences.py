@@ -125,6 +125,7 @@ def test_the_stop_and_the_names_of_points_are_in_the_scene_s_units(tmp_path):
     assert branch.events["distance"].tolist() == pytest.approx([0.39 / 0.4, 0.35 / 0.4, 0.3 / 0.4])
 
 
+@pytest.mark.full
 def test_a_stage_that_turns_back_says_that_it_did_not_arrive(tmp_path):
     """A clamped strip of length 1 cannot be pulled to a distance of 1.1: the run goes through the straight state and back."""
     stages = "stages: [{follow: distance, to: 1.1}]\n"

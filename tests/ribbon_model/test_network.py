@@ -27,6 +27,7 @@ def _changes(branch, name):
 # --- closed forms ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("corners", [3, 6])
 def test_a_polygon_of_rods_that_floats(corners):
     """Straight rods of side 1, rigid corners, natural curvature K about the width, in the plane of the polygon.
@@ -99,6 +100,7 @@ def _portal(section, foot):
     return Network({"strip": section}, members, joints, {"A": foot, "D": foot}, loads, {"P": 0.5})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "section, foot, known",
     [
@@ -140,7 +142,8 @@ def test_a_right_angle_frame_under_end_moments(direction):
         np.testing.assert_allclose(np.append(force, moment), 0, atol=1e-8)  # the loads balance each other
 
 
-@pytest.mark.parametrize("covers", [pytest.param(1, marks=pytest.mark.full), 2])  # once: configs/network_overcurved.yaml
+@pytest.mark.full
+@pytest.mark.parametrize("covers", [1, 2])
 def test_rings_that_are_covered_several_times(covers):
     """(m + B1 y / C)(m + B1 y / B2) = k^2 with y = kappa_n R - m: where rings buckle; k = m and k >= 1 double, k = 0 simple."""
     B2, C, m = 1.4, 0.7, covers
@@ -204,7 +207,7 @@ LAWS = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(3)  # each law, and both cuts
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("cuts", [(0.37,), (0.2, 0.65)])
 def test_a_cut_by_rigid_joints_changes_nothing(name, cuts):

@@ -19,6 +19,7 @@ def _rod(**numbers) -> dict[str, Section]:
     return {"strip": Section(ROD, {"B1": 1.0, "B2": 1.7, "C": 0.8, **numbers})}
 
 
+@pytest.mark.full
 def test_a_ring_in_space_under_a_pressure_that_follows_it():
     """p R^3 / B = n^2 - 1 in its plane, as of the pressure on the area, which has an energy; out of it the ring is stiff."""
     half = Member("strip", math.pi, strains=(1.0, 0.0, 0.0))

@@ -41,6 +41,7 @@ def _places(branch, label):
     return [(point["kappa_n"] / TURN, point.index_change) for point in branch.labelled(label)]
 
 
+@pytest.mark.full
 def test_the_branch_from_the_circle_to_the_triple_one_and_back():
     """(1, 2): its fold is known by quadrature; it meets the 3-covered circle at -1/2 and comes back as its own mirror image."""
     held, branch = _left(1, 2, (-1, 4.5), -0.3)

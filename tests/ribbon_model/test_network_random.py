@@ -74,6 +74,7 @@ def test_round_off_where_a_network_can_move_is_no_state(seed):
         (_random(seed) if seed == 167 else dataclasses.replace(_random(seed), numbers={"field": 2.0})).first_point()
 
 
+@pytest.mark.full
 def test_a_state_beyond_a_fold_is_found_by_descent(monkeypatch):
     """The way from the drawing turns back at 68 %; a hinge whose axis is not of unit length."""
     network, said = _random(82), []
@@ -100,7 +101,7 @@ def test_an_unloaded_network_has_sizes():
     assert trace(network.first_point()[0], free=["P"], max_points=6, progress=False)[-1]["P"] > 0.01
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(200))
 def test_a_random_network_has_a_state_or_a_sentence(seed):
     network = _random(seed)

@@ -44,6 +44,7 @@ def everything():
     return network, point
 
 
+@pytest.mark.full
 def test_derivatives_are_those_of_the_energy(everything):
     """Along random changes that keep all conditions: slopes at any state, curvatures at a state of equilibrium."""
     network, point = everything
@@ -81,6 +82,7 @@ STATES = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", STATES)
 def test_the_index_is_that_of_the_continuous_network(name):
     """The number of negative eigenvalues of the segments' Hessian: another way to the index of the whole network."""

@@ -433,6 +433,7 @@ def test_stability_of_the_bimodal_state_of_kuramoto_and_sivashinsky():
     assert np.allclose(np.sort(last.system.eigenvalues(last.x)[:4].real)[::-1], known[:4], rtol=1e-5)
 
 
+@pytest.mark.full
 def test_counts_change_at_labelled_points_only():
     """In the diagram of Kuramoto and Sivashinsky up to 40: by one at folds, by two at Hopf points, by one or none at BP."""
     problem = contin.BoundaryValueProblem(

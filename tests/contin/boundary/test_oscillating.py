@@ -63,6 +63,7 @@ def integrated(b, count=12):
     return last - first, fit.integ()(1.0) - fit.integ()(0.0)
 
 
+@pytest.mark.full
 def test_an_oscillation_of_the_brusselator(hopf):
     branch = contin.trace(hopf, branch=1, limits={"b": (4.9, 5.3)})
     first, last = branch[0], branch[-1]
@@ -73,6 +74,7 @@ def test_an_oscillation_of_the_brusselator(hopf):
     assert last["mean"] == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.full
 def test_more_times_have_smaller_errors(hopf):
     start, tangent = oscillation(hopf, 15)
     branch = contin.trace(start, tangent=tangent, limits={"b": (4.9, 5.3)}, errors=False)

@@ -140,6 +140,7 @@ def oscillator(t, y, above, w):
     return np.array([y[1], -0.1 * y[1] - y[0] - 5 * above * (y[0] - 1) + np.cos(w * t)])
 
 
+@pytest.mark.full
 def test_folds_of_an_oscillator_with_a_spring_at_a_distance():
     """x'' + x' / 10 + x + 5 max(0, x - 1) = cos(w t): both folds are zeros of the period map less 1 and of det(Dmap - 1)."""
 

@@ -72,6 +72,7 @@ def crossing(start, rounds):
     return done.t_events[0][rounds]
 
 
+@pytest.mark.full
 def test_of_van_der_pol_against_perturbed_motions():
     """The motion from u(t) + v passes zero earlier by Z.v after some rounds; central differences, right to the square."""
     orbit = contin.cycle(CycleProblem(van_der_pol, ["x", "v"], {"mu": 2.0}), [1.0, 0.0])

@@ -94,6 +94,7 @@ def cascade(u, p):
     return v2 - v1, v1 - v2, v6 - v3, v3 + v5 - v4 - v6, v4 - v5, v10 - v7, v7 + v9 - v8 - v10, v8 - v9
 
 
+@pytest.mark.full
 def test_a_cascade_oscillates(tmp_path):
     """Its Hopf point, with the pair of all eight states beside three zeros, and cycles as a time integration has them."""
     problem = AlgebraicProblem(cascade, NAMES, {"v": 0.05})

@@ -66,6 +66,7 @@ def flat(residual, count, solver, high):
     return trace(solve(problem, np.zeros(count)), free=["lam"], limits={"lam": (5, high)})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", [Plain, Signed, lambda matrix: splu(matrix, permc_spec="MMD_AT_PLUS_A")])
 def test_branch_points_are_those_of_closed_forms(solver):
     """Also where the solver says no sign: singular values that pass zero are counted by solves alone."""
@@ -79,6 +80,7 @@ def test_branch_points_are_those_of_closed_forms(solver):
         assert Plain.made > before[0] and all(Plain.solves[kind] > before[1][kind] for kind in "NT")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", [None, Plain])
 def test_points_where_two_modes_become_singular(solver):
     branch = flat(square(), SIDE**2, solver, 60)

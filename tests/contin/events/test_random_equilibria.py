@@ -48,6 +48,7 @@ def trivial_branch(spectrum, seed, symmetric, limits=None, nonlinear=(0.0, 1.0, 
     return contin.trace(start, free=["lam"], limits={"lam": limits or (0, 1.5 * max(spectrum))}, **options)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("nonlinear", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.5, 1.0, 1.0)])
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize("seed", range(4))
@@ -85,6 +86,7 @@ def spread(u, p, out):
             out[i] = (p[0] - (i - 1) / 2) * u[i] + 3 * u[i - 1]
 
 
+@pytest.mark.full
 def test_hopf_points_of_a_large_problem_where_the_number_of_known_eigenvalues_differs():
     """Of sparse matrices only eigenvalues beside the axis and right of it are computed; pairs cross at a = 0, 15, 30, 45."""
     start = contin.solve(contin.AlgebraicProblem(spread, 240, {"a": -1.0}), [0.0] * 240)
@@ -151,6 +153,7 @@ def found_on(branch):
     return [(round(point["a"], 6), getattr(point.details, "dimension", 1)) for point in branch.labelled("BP")]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("dynamics", [True, False])
 @pytest.mark.parametrize("step", [34.0, 100.0])
 def test_double_points_of_a_grid_in_long_steps(step, dynamics):

@@ -166,6 +166,7 @@ def run(tmp_path):
     return run
 
 
+@pytest.mark.full
 def test_kernels_from_the_cache_call_kernels(run, tmp_path):
     """Whatever is in the cache: nothing, all, or some. A change of what is called reaches the callers."""
     assert run() == (51, PENDING)

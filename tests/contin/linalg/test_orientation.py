@@ -45,6 +45,7 @@ def arms_of(seed, both):
     return found, np.array(junction.details.tangents), np.array(junction.details.kernel), np.array([end.x for end in ends])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("both", [False, True])
 def test_arms_in_the_same_order(both):
     """A simple pitchfork, and a double one with four lines of arms (x, y and the diagonals)."""
@@ -192,6 +193,7 @@ def on_kernel(name):
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.full
 def test_two_kernels():
     """A pitchfork diagram with functions (buckling of a rod in its second mode), Lorenz's arms, a curve through a cusp."""
     flags = pathlib.Path("/proc/cpuinfo")

@@ -78,6 +78,7 @@ def test_the_same_seed_finds_the_same():
     assert len(again.branches) == len(found.branches) > 2
 
 
+@pytest.mark.full
 def test_no_solution_twice():
     """Nine roots on nine lines, of which the start reaches one; each line is followed once, both ways."""
     lines = AlgebraicProblem(lambda u, p: (math.prod(u.x - 0.1 * p.a - k for k in range(9)),), ["x"], {"a": 0.0})
