@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import io
 import json
 import platform
 import time
@@ -22,7 +23,6 @@ from branches.scene.columns import NUMBER, Row
 from branches.scene.parse import dump
 from branches.scene.stage import Stage
 from branches.store.files import StoreError, no_branch, write_bytes
-from branches.store.image import image
 from branches.store.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Point
 from contin.lowlevel import Collocation, State, Stop
@@ -44,7 +44,8 @@ def _versions() -> str:
 @functools.lru_cache(maxsize=32)  # making it takes 8 ms; the branches of a sweep differ in their text only
 def _empty_file(kind: str, units: str, states: tuple[str, ...], free: tuple[str, ...], tables: tuple) -> bytes:
     """Return the image of a file without points, and without its scene; ``tables`` hold name, type and words of columns."""
-    with h5py.File.in_memory(libver=_LIBRARY) as file:
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", libver=_LIBRARY) as file:
         file.attrs.update({
             "format": FORMAT, "format_version": FORMAT_VERSION, "status": "running", "stop": "", "stop_reason": "",
             "kind": kind, "units": units, "platform": platform.platform(),
@@ -55,8 +56,7 @@ def _empty_file(kind: str, units: str, states: tuple[str, ...], free: tuple[str,
             data = file.create_dataset(table, (0,), types, maxshape=(None,), chunks=(256,), fletcher32=True)
             data.attrs.update({name: words for name, _, words in columns})
         _create_solutions(file.create_group("solutions"), states)
-        file.flush()
-        return image(file)
+    return memory.getvalue()
 
 
 def _create_solutions(group, names: tuple[str, ...]) -> None:
@@ -109,7 +109,8 @@ class BranchWriter:
         #: Further data for a resumed run, by name: called at every checkpoint that writes the state.
         self.kept: Callable[[], dict[str, bytes]] = dict
         with damage_told(path):
-            self._file = h5py.File.in_memory(image or _image_of(first, self._tables), libver=_LIBRARY)
+            self._memory = io.BytesIO(image or _image_of(first, self._tables))
+            self._file = h5py.File(self._memory, "r+", libver=_LIBRARY)
             self.count = 0 if image is None else self._rewind()
         self._file.attrs["config"] = dump(first.scene)
         self.note(str(self._file.attrs.get("notes", "")).splitlines())
@@ -170,7 +171,7 @@ class BranchWriter:
 
     def image(self) -> bytes:
         """Return the content of the file at the last checkpoint."""
-        return image(self._file)
+        return self._memory.getvalue()
 
     def points(self) -> np.ndarray:
         """Return the rows of points written so far."""

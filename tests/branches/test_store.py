@@ -2,7 +2,6 @@
 
 import dataclasses
 import errno
-import io
 import os
 import re
 import signal
@@ -18,7 +17,7 @@ import pytest
 from branches.read import read_branch
 from branches.run.runner import run_scene
 from branches.scene.closed import ClosedScene
-from branches.store import files, image
+from branches.store import files
 from branches.store.files import StoreError, prepare, write_bytes
 from branches.store.writer import open_branch
 from ribbon_model.segments import discretized
@@ -346,17 +345,3 @@ print(times)
     ended = [process.communicate(timeout=60) for process in processes]
     assert all(err == "" for _, err in ended) and sum(int(out) for out, _ in ended) > 100
     assert os.listdir(tmp_path) == []
-
-
-def test_the_checksum_of_an_image_is_that_of_hdf5(tmp_path):
-    """A file that HDF5 closed itself has the right one; the image of an open file is read by every version of HDF5."""
-    for version in ("v108", "v110"):
-        with h5py.File(tmp_path / "closed.h5", "w", libver=version) as file:
-            file.attrs["n"] = 3
-        data = (tmp_path / "closed.h5").read_bytes()
-        assert image.checksum(data[:44]).to_bytes(4, "little") == data[44:48]
-        with h5py.File.in_memory(libver=version) as file:
-            file.attrs["n"] = 3
-            file.flush()
-            with h5py.File(io.BytesIO(image.image(file))) as read:
-                assert read.attrs["n"] == 3
