@@ -99,30 +99,24 @@ def test_main_job(command, root):
         assert line in done.out
 
 
-def test_every_scene_against_the_exact_solution(tmp_path, root, silent):
-    """Labelled points of the ribbon's scenes of one branch, in order, against the quadrature of ribbon_model.exact."""
-    scenes = {file.stem: load(file) for file in sorted((root / "configs").glob("*.yaml"))}
-    scenes = {
-        name: scene
-        for name, scene in scenes.items()
-        if isinstance(scene, ClosedScene) and scene.law == "ribbon" and not scene.stability
-    }
-    assert len(scenes) >= 6
-    for name, config in scenes.items():
-        path, mode = tmp_path / f"{name}.h5", (config.m, config.n, config.nu)
-        assert run_scene(config, path, silent()) == "complete"
-        with h5py.File(path) as file:
-            events = file["events"][:]
-        limits = config.limits["kappa_n"]
-        known = [point for point in exact.curve(*mode, limits) if point.label]
-        assert events["label"].tolist() == [b"BP", *(b"LP" for _ in known[1:-1]), b"EP"], mode
-        assert np.abs(events["kappa_n"] - [point.kappa_n for point in known]).max() < 1e-9
-        assert np.abs(events["kappa_star"] - [point.kappa_star for point in known]).max() < 1e-9
-        folds, end = exact.folds(*mode, limits), exact.end(*mode)
-        assert np.abs(events["kappa_n"][1:-1] - [fold.kappa_n for fold in folds]).max(initial=0) < 1e-9
-        assert (events["name"][-1] == b"trivial branch") == (end is not None)
-        if end is not None:  # (covering index, kappa_n) of the circle, equation (27)
-            assert abs(events["kappa_star"][-1] - end[0]) < 1e-9 and abs(events["kappa_n"][-1] - end[1]) < 1e-9
+@pytest.mark.parametrize(("m", "n"), [(1, 2), (1, 3), (3, 1), (3, 4), (3, 5), (5, 6)])
+def test_a_branch_of_the_diagram_against_the_exact_solution(m, n, tmp_path, root, silent):
+    """Labelled points of a branch of Fig. 12a, in order, against the quadrature of ribbon_model.exact."""
+    config = load(root / "configs" / "fig12.yaml", [f"m={m}", f"n={n}", "stability=false"])
+    path, mode = tmp_path / "branch.h5", (config.m, config.n, config.nu)
+    assert run_scene(config, path, silent()) == "complete"
+    with h5py.File(path) as file:
+        events = file["events"][:]
+    limits = config.limits["kappa_n"]
+    known = [point for point in exact.curve(*mode, limits) if point.label]
+    assert events["label"].tolist() == [b"BP", *(b"LP" for _ in known[1:-1]), b"EP"], mode
+    assert np.abs(events["kappa_n"] - [point.kappa_n for point in known]).max() < 1e-9
+    assert np.abs(events["kappa_star"] - [point.kappa_star for point in known]).max() < 1e-9
+    folds, end = exact.folds(*mode, limits), exact.end(*mode)
+    assert np.abs(events["kappa_n"][1:-1] - [fold.kappa_n for fold in folds]).max(initial=0) < 1e-9
+    assert (events["name"][-1] == b"trivial branch") == (end is not None)
+    if end is not None:  # (covering index, kappa_n) of the circle, equation (27)
+        assert abs(events["kappa_star"][-1] - end[0]) < 1e-9 and abs(events["kappa_n"][-1] - end[1]) < 1e-9
 
 
 def test_help_imports_nothing_heavy(command):
