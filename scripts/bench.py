@@ -51,9 +51,6 @@ def arguments(argv=None) -> argparse.Namespace:
         "--page", metavar="FILE", help="put the tables into this Markdown file, the pictures into images/ beside it"
     )
     parser.add_argument(
-        "--bifpy-python", metavar="PATH", default=sys.executable, help="a Python interpreter with bifpy (default: this one)"
-    )
-    parser.add_argument(
         "--before", metavar="DIR", help="a checkout of an earlier version, which `problems` times in turns with this one"
     )
     parser.add_argument(
@@ -78,7 +75,7 @@ def measure(part: str, options: argparse.Namespace) -> dict:
 
     from ribbon_model import exact
 
-    quick, bifpy_python = options.quick, options.bifpy_python
+    quick = options.quick
     if part == "problems":
         return problems.run(quick, options.before, options.before_python)
     plain = {each.__name__.partition(".")[2]: each for each in (cost, startup, many, stress, cycles, small, threads, defaults)}
@@ -88,8 +85,8 @@ def measure(part: str, options: argparse.Namespace) -> dict:
     if part == "cores":
         return cores.run(quick, exact_fold)
     if part == "fold":
-        return fold.run(quick, bifpy_python, exact_fold, budget=30 if quick else 150)
-    return like_for_like.run(quick, bifpy_python, exact_fold)
+        return fold.run(quick, exact_fold, budget=30 if quick else 150)
+    return like_for_like.run(quick, exact_fold)
 
 
 def main(argv=None) -> int:

@@ -11,15 +11,15 @@ from collections.abc import Callable
 
 from peers import auto_07p
 
-from benchmarks.like_for_like import bifpy, bifpy_missing, second_run
+from benchmarks.like_for_like import second_run
 from benchmarks.measure import in_turn, median
 
 ERRORS = (1e-6, 1e-8, 1e-10, 1e-12)
 CELL, LOOP = "contin, cell", "AUTO-07p, loop in 13 components"
-HALF, AUTO_CELL, SCIPY, BIFPY = "AUTO-07p, half loop in 13 components", "AUTO-07p, cell", "SciPy solve_bvp, cell", "bifpy, cell"
+HALF, AUTO_CELL, SCIPY = "AUTO-07p, half loop in 13 components", "AUTO-07p, cell", "SciPy solve_bvp, cell"
 
 
-def run(quick: bool, bifpy_python: str, exact_fold: float, budget: float) -> dict:
+def run(quick: bool, exact_fold: float, budget: float) -> dict:
     """Return all measurements, the fastest settings by tool and error, and the tools left out; ``budget`` is in seconds."""
     skipped, contestants = {}, dict(_contin())
     if (reason := auto_07p.missing()) is not None:
@@ -29,17 +29,12 @@ def run(quick: bool, bifpy_python: str, exact_fold: float, budget: float) -> dic
             auto_07p.build(statement)
         contestants |= _auto()
     contestants |= _scipy()
-    if (reason := bifpy_missing(bifpy_python)) is not None:
-        skipped[BIFPY] = reason
     began, runs = time.perf_counter(), {key: [] for key in contestants}
     for repeat in range(2 if quick else 5):
         if repeat and time.perf_counter() - began > budget * repeat / (repeat + 1):
             break
         for key, some in in_turn(contestants, 1).items():
             runs[key] += some
-    if BIFPY not in skipped:
-        contestants = {(BIFPY, "20 × 4"): lambda: bifpy(bifpy_python, "cell", "LP", 20, 4, 1e-8)}
-        runs |= in_turn(contestants, 1 if quick else 3)
     rows = [
         {
             "tool": tool, "setting": setting, "seconds": median(row["seconds"] + row.get("circle_seconds", 0) for row in some),

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
-
 from peers import auto_07p
 
-from benchmarks.measure import SCRIPTS, child, in_turn, median, task
+from benchmarks.measure import in_turn, median, task
 
 #: The tolerance that both are given: AUTO's EPSL and EPSU, contin's Newton tolerance. The first is the one of the summary.
 TOLERANCES = (1e-10, 1e-8, 1e-6)
 END = -0.5
 
 
-def bifpy_missing(python: str) -> str | None:
-    """Return the reason why bifpy cannot be run by that interpreter, or None."""
-    if auto_07p.shutil.which("gfortran") is None:
-        return "gfortran is not on the path"
-    found = subprocess.run([python, "-c", "import bifpy"], capture_output=True)
-    return None if found.returncode == 0 else "the interpreter has no bifpy (pip install bifpy)"
-
-
-def bifpy(python: str, statement: str, stop: str, intervals=40, degree=4, tolerance=1e-10) -> dict:
-    """Run one study by bifpy."""
-    script = str(SCRIPTS / "peers" / "bifpy_auto.py")
-    return child(python, script, statement, stop, str(intervals), str(degree), str(tolerance), "1.0")
-
-
-def run(quick: bool, bifpy_python: str, exact_fold: float) -> dict:
+def run(quick: bool, exact_fold: float) -> dict:
     """Return results by program and tolerance, and the programs left out."""
     results, skipped = {}, {}
     if (reason := auto_07p.missing()) is not None:
@@ -40,11 +24,6 @@ def run(quick: bool, bifpy_python: str, exact_fold: float) -> dict:
             contestants["AUTO-07p"] = lambda tolerance=tolerance: auto_07p.study("half", tolerance=tolerance)
         runs = in_turn(contestants, 3 if quick else 15)
         results[f"{tolerance:.0e}"] = {name: _summary(name, some, tolerance, exact_fold) for name, some in runs.items()}
-    if (reason := bifpy_missing(bifpy_python)) is not None:
-        skipped["bifpy"] = reason
-    else:
-        runs = in_turn({"bifpy": lambda: bifpy(bifpy_python, "half", "BP")}, 1 if quick else 3)
-        results[f"{TOLERANCES[0]:.0e}"]["bifpy"] = _summary("bifpy", runs["bifpy"], TOLERANCES[0], exact_fold)
     return {"results": results, "skipped": skipped, "exact_fold": exact_fold, "exact_end": END}
 
 
