@@ -25,6 +25,7 @@ PAGES = [
     page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem not in RUN_ELSEWHERE
 ]
 PROGRAM = ".venv/bin/python "
+RIBBON = ".venv/bin/ribbon "
 ELSEWHERE = re.compile(r"-m branches\.(shell|strip|paper .*fig7)")
 #: Programs that have run as a process of their own, as users start them; from then on they are called.
 started = set()
@@ -67,7 +68,7 @@ def test_blocks_run(page, project):
         if language == "python":
             exec(compile(block, str(page), "exec"), scope)
             continue
-        for line in block.replace("\\\n", " ").splitlines():
+        for line in block.replace("\\\n", " ").replace(RIBBON, f"{PROGRAM}-m branches.").splitlines():
             if line.startswith(PROGRAM) and not ELSEWHERE.search(line):  # the others are what it prints
                 _run(shlex.split(line.removeprefix(PROGRAM), comments=True))
 
