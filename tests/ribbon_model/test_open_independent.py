@@ -12,7 +12,7 @@ A special point is where the matrix of these derivatives is singular. Bordered b
 zero there: [A b; c 0] [v; g] = [0; 1]. A fold is F = g = 0; a branch point is F + mu b = 0, g = 0, w.F_lambda = 0 with w from
 the transposed matrix (Moore 1980; Govaerts 2000, ch. 8), which is regular where both branches cross.
 
-Run as a program, this file prints the table of docs/open-strips.md.
+Run as a program, this file prints the table of docs/open-strips-reference.md.
 """
 
 import math
