@@ -116,7 +116,7 @@ def markdown(sections: list[Section]) -> str:
         if section.rows:
             lines += [_line(HEADER), _line(["---"] * len(HEADER)), *(_line(row.cells()) for row in section.rows), ""]
         for name in section.pictures:
-            lines += [f"![{section.title}]({name}.png)", "", f"[vector graphics]({name}.svg)", ""]
+            lines += [f"![{section.title}]({name}.png)", ""]
         lines += [f"- {note}" for note in section.notes] + [""] * bool(section.notes)
     return "\n".join(lines)
 
