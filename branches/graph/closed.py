@@ -247,8 +247,8 @@ def _in_order(graph, edges) -> list[dict]:
 def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
     """Return all equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
 
-    Values between computed points come from a cubic spline over arclength; `branches.at_value` solves them. States on branches
-    have the number of their ``edge`` and their ``arclength`` on it.
+    Values between computed points come from a cubic spline over arclength; `branches.graph.at_value` solves them. States on
+    branches have the number of their ``edge`` and their ``arclength`` on it.
     """
     found = []
     materials = {family[:2] for family in families(graph) if law in (None, family[0]) and nu in (None, family[1])}

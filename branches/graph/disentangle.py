@@ -127,7 +127,7 @@ def _columns(curves, window) -> np.ndarray:
 
 
 def _course(curve, columns, start, end, sense) -> Course:
-    """The branch cut at the columns; a branch between two circles rises (see `branches.draw_diagram.lines`)."""
+    """The branch cut at the columns; a branch between two circles rises (see `branches.graph.picture`)."""
     column, at, turns = [], [], _turns(curve)
     for first, last in zip(turns[:-1], turns[1:]):
         x, place = curve[first : last + 1], np.arange(first, last + 1.0)

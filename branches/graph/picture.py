@@ -104,7 +104,7 @@ def figure(graph, law: str, nu: float, window=None, disentangle: bool = True):
     window : (float, float), optional
         Of kappa_n; by default `WINDOW`, or the part of it in which the special points are.
     disentangle : bool
-        Add the panel where the heights between the circles are free (`branches.disentangle`).
+        Add the panel where the heights between the circles are free (`branches.graph.disentangle`).
 
     Returns
     -------

@@ -37,7 +37,7 @@ def preview(scene: Scene | Sweep, step: float = 0.2):
     Returns
     -------
     networkx.MultiGraph
-        As from `branches.diagram.run_many`. The arclength of its edges is that in the plane of the quadrature's unknowns;
+        As from `branches.run.many.run_many`. The arclength of its edges is that in the plane of the quadrature's unknowns;
         ``exact`` holds the points of the quadrature. A branch whose quadrature fails is listed, with the reason, in
         ``graph.graph["failed"]``.
     """

@@ -14,7 +14,7 @@ BUCKLED = Colour.SKY
 
 
 def keep(figure, folder: Path, name: str) -> str:
-    """Write a figure of no display as name.png and name.svg; the name. Raises `branches.files.StoreError`."""
+    """Write a figure of no display as name.png and name.svg; the name. Raises `branches.store.files.StoreError`."""
     for suffix in (".png", ".svg"):
         write_picture(figure, folder / f"{name}{suffix}")
     return name

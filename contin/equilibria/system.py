@@ -27,7 +27,7 @@ class Algebraic(AlgebraicEquations):
     """An algebraic problem with chosen free parameters, as the continuation sees it.
 
     Unknowns ``x`` are the states, then the free parameters. The interface is that of
-    `contin.collocation.Collocation`; there is no mesh to adapt.
+    `contin.lowlevel.Collocation`; there is no mesh to adapt.
 
     Raises
     ------
