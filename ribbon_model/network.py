@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections import namedtuple
+from collections import Counter, namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -161,6 +161,10 @@ class Network:
             setattr(self, name, ends.unit(name, getattr(self, name)))
         self._check()
         ends.check_known(self.numbers, self.known)
+        for name, times in Counter([*self.known, *self._of_sections, ASSEMBLY, *self._named((*FRAME, *CENTRELINE))]).items():
+            if times > 1:
+                what = f"loads: {name}" if name in self.loads else name
+                raise ValueError(f"{what}: is the name of another number of this network; give another name")
 
     def _check(self) -> None:
         """Raise ValueError for names of nothing, ends that are joined twice, and loads that a floating network cannot bear."""
@@ -173,7 +177,7 @@ class Network:
             for each in joint.members:
                 _known(f"joints: {name}: member", each.member, self.members)
                 if (each.member, each.end) in taken:
-                    raise ValueError(f"joints: {name}: the {each.end} of {each.member} is joined twice")
+                    raise ValueError(f"joints: {name}: {self.said(each)!r} is joined twice; name it in one joint only")
                 taken.add((each.member, each.end))
         for name in self.held:
             _known("held", name, self.joints)
@@ -232,6 +236,14 @@ class Network:
     def full_name(self, section: str, number: str) -> str:
         """Return the name of a number of a section among all."""
         return number if len(self.sections) == 1 else f"{number}_{section}"
+
+    def said(self, each: JointEnd) -> str:
+        """Return an end in the words of a scene: 'beam start', and 'beam at 0.5' for one of the pieces 'beam 1', 'beam 2'."""
+        name, _, number = each.member.partition(" ")
+        lengths = [member.length for other, member in self.members.items() if other.partition(" ")[0] == name]
+        before = int(number or 1) - (each.end == START)
+        part = sum(lengths[:before]) / sum(lengths)
+        return f"{name} at {part:.6g}" if 0 < before < len(lengths) else f"{name} {each.end}"
 
     # --- geometry of the drawing --------------------------------------------------------------------------------------
 

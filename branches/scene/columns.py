@@ -173,6 +173,10 @@ _INDEX = (
 )  # fmt: skip
 
 
+#: Names of columns that every staged result has, which no number can have.
+OWN = (*(one.name for one in (*_BOOK, *_INDEX)), "energy", "stage")
+
+
 @dataclass(frozen=True)
 class Columns:
     """All columns of a result, in the order of its tables: book-keeping, values, the index."""

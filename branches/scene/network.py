@@ -7,13 +7,16 @@ A scene with ``strips`` is one. Numbers are in any unit of length and, for stiff
 from __future__ import annotations
 
 import functools
+import keyword
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from branches.scene.columns import OWN
 from branches.scene.fields import StepConfig, Strict
 from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
 from ribbon_model.changed_supports import replacing
@@ -179,13 +182,19 @@ class NetworkScene(StagedScene):
     def _fits(self):
         for names in (self.sections, self.strips, self.joints, self.loads):
             for name in names:
-                if not name.isidentifier():
-                    raise ValueError(f"{name!r} is not usable as a name (letters, digits and _)")
+                if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
+                    raise ValueError(f"{name!r} is not usable as a name (letters, digits and _, from a letter on)")
         if (self.material is None) == (not self.sections):
             raise ValueError("material, sections: give one of them")
         if self.stages[0].held or self.stages[0].numbers:
             raise ValueError("stage 1: held, numbers: those of the scene are the first stage's")
-        self.check_stages([f"{name}_{axis}" for name in self.strip().joints for axis in "xyz"])
+        self.check_stages([f"{column(name)}_{axis}" for name in self.strip().joints for axis in "xyz"])
+        networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
+        numbers = {name for network in networks for name in network.parameters}
+        names = [*numbers, *self.found_names, *OWN]
+        for name, times in Counter([*names, *(f"error_{name}" for name in names)]).items():
+            if times > 1:
+                raise ValueError(f"{name}: is the name of two columns; give a load, joint or number another name")
         return self
 
     # --- the network --------------------------------------------------------------------------------------------------
@@ -223,6 +232,15 @@ class NetworkScene(StagedScene):
         held = held | {name: end.end() for name, end in one.held.items()}
         return {name: end for name, end in held.items() if end != FREE_END}, tuple(dict.fromkeys((*changed, *one.held)))
 
+    @functools.cached_property
+    def found_names(self) -> tuple[str, ...]:
+        """The columns of what is found in states."""
+        networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
+        places = [f"{column(joint)}_{axis}" for joint in networks[0].joints for axis in "xyz"]
+        held = dict.fromkeys(joint for network in networks for joint in network.held)
+        reactions = [f"{kind}_{joint}_{axis}" for joint in held for kind in "FM" for axis in "xyz"]
+        return ("potential", *places, *reactions, *(["floating"] if any(network.floats for network in networks) else []))
+
     def replacing(self, stage: int) -> tuple[str, ...]:
         """Return the names of the loads that replace reactions in a stage."""
         held, changed = self._held(stage)
@@ -240,7 +258,7 @@ class NetworkScene(StagedScene):
         for name, member in list(members.items()):
             parts = sorted(cuts.get(name, []))
             if parts:
-                pieces[name] = [f"{name}_{number}" for number in range(1, len(parts) + 2)]
+                pieces[name] = [f"{name} {number}" for number in range(1, len(parts) + 2)]
                 del members[name]
                 members.update(zip(pieces[name], member.cut(parts)))
         for name, joint in self.joints.items():
@@ -255,7 +273,13 @@ class NetworkScene(StagedScene):
         for name in changed:
             if name not in joints:
                 raise ValueError(f"held: {name!r} must be one of {', '.join(joints)}")
-        loads |= {number: load for name in changed for number, load in replacing(name, held.get(name)).items()}
+        for name in changed:
+            for number, load in replacing(name, held.get(name)).items():
+                if number in loads:
+                    raise ValueError(
+                        f"loads: {number}: replaces a reaction at {name}, where the support changes; give another name"
+                    )
+                loads[number] = load
         told = {name for stage in self.stages for name in (stage.follow, *stage.numbers)}
         numbers = dict.fromkeys((name for name in (*POTENTIALS, FOLLOWER) if name in told), 0.0) | self.numbers
         where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
@@ -309,8 +333,12 @@ class NetworkScene(StagedScene):
         for place, action in actions.items():
             name = place
             if place not in self.joints:
-                ends = list(_ends_at(*_parsed(f"loads: {number}", place, self.strips), cuts, pieces))
-                name = re.sub(r"\W+", "_", place)
+                strip, side, part = _parsed(f"loads: {number}", place, self.strips)
+                ends = list(_ends_at(strip, side, part, cuts, pieces))
+                name, where = place if side else f"{strip} at {part!r}", {(piece, end) for piece, end, _ in ends}
+                for other, joint in joints.items():
+                    if other != name and where & {(each.member, each.end) for each in joint.members}:
+                        raise ValueError(f"loads: {number}: {place!r} is joined at {other}; give {other} in its place")
                 joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end, _ in ends]))
             if action.force is not None:
                 (followers if action.follows else forces).append((name, action.force, action.arm))
@@ -332,6 +360,11 @@ class NetworkScene(StagedScene):
         """The network in words."""
         count, joints = len(self.strips), len(self.joints)
         return f"{count} strip{'s' * (count != 1)} ({self.law_name}), {joints} joint{'s' * (joints != 1)}"
+
+
+def column(joint: str) -> str:
+    """Return the name of a joint in columns: that of 'beam at 0.5' is beam_at_0_5."""
+    return re.sub(r"\W+", "_", joint)
 
 
 def _parsed(where: str, place: str, names) -> tuple[str, str | None, float | None]:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from branches.scene.fields import ConfigError
+from branches.scene.network import column
 from branches.scene.open_stage import OpenStage, newton_of
 from contin import ContinError, MeshControl, Point
 from contin.lowlevel import Collocation, Continuation
@@ -75,11 +76,7 @@ class NetworkStage(OpenStage):
     # --- columns --------------------------------------------------------------------------------------------------------
 
     def found_names(self, numbers: Collection[str]) -> tuple[str, ...]:
-        networks = [self.scene.strip(number) for number in range(1, len(self.scene.stages) + 1)]
-        places = [f"{joint}_{axis}" for joint in self.strip.joints for axis in _AXES]
-        held = dict.fromkeys(joint for network in networks for joint in network.held)
-        reactions = [f"{kind}_{joint}_{axis}" for joint in held for kind in "FM" for axis in _AXES]
-        return ("potential", *places, *reactions, *(("floating",) if any(network.floats for network in networks) else ()))
+        return self.scene.found_names
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
         """Loads and reactions that do not act are zero; displacements and rotations that are not prescribed are those found."""
@@ -94,9 +91,9 @@ class NetworkStage(OpenStage):
         network = self.strip
         found = {"potential": network.potential(point)}
         for joint in network.joints:
-            found |= zip((f"{joint}_{axis}" for axis in _AXES), map(float, network.place(point, joint)))
+            found |= zip((f"{column(joint)}_{axis}" for axis in _AXES), map(float, network.place(point, joint)))
         for joint, parts in network.reactions(point).items():
-            if joint == "floating":
+            if network.floats:
                 found[joint] = float(max(np.abs(part).max() for part in parts))
                 continue
             for kind, part in zip("FM", parts):
@@ -119,7 +116,7 @@ class NetworkStage(OpenStage):
         network = self.strip
         if forces := [*network.loads[name].forces, *network.loads[name].followers] if name in network.loads else ():
             joint, direction, _ = forces[0]
-            return f"{joint}_{_AXES[int(np.argmax(np.abs(direction)))]}"
+            return f"{column(joint)}_{_AXES[int(np.argmax(np.abs(direction)))]}"
         joint, _, move = name.rpartition("_")
         if move in MOVES and joint in network.held:
             return f"F_{joint}_{move[1]}"
@@ -152,8 +149,9 @@ class NetworkStage(OpenStage):
         if found := re.fullmatch(r"([FM])_(\w+)_([xyz])", name):
             kind = "force" if found[1] == "F" else "moment"
             return f"{kind} on the network at {found[2]}, along {found[3]}", f"{kind} at {found[2]} along {found[3]}"
-        if joint in network.joints and last in _AXES:
-            return f"place of {joint} along {last}", f"{last} of {joint}"
+        place = {column(one): one for one in network.joints}.get(joint)
+        if place and last in _AXES:
+            return f"place of {place} along {last}", f"{last} of {place}"
         if joint in network.joints and last in MOVES:
             return f"prescribed displacement of {joint} along {last[1]}", f"displacement of {joint} along {last[1]}"
         if joint in network.joints and last in ANGLES:

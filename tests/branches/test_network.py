@@ -19,6 +19,7 @@ from branches.run.barriers import falls, places, report, told
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
+from branches.scene.network import column
 from branches.scene.parse import dump, load, parse
 from ribbon_model.descent import past
 from ribbon_model.network import START
@@ -137,7 +138,9 @@ def test_shooting_finds_the_same_states(name, shipped):
                 pulls = [float(branch.points[f"F_{joint_name}_{x}"][row]) for x in "xyz"]
                 assert end.force == pytest.approx(pulls, abs=1e-8 * size)
             place = end.place + end.frame @ each.arm
-            assert place == pytest.approx([float(branch.points[f"{joint_name}_{x}"][row]) for x in "xyz"], abs=1e-9 * size)
+            assert place == pytest.approx(
+                [float(branch.points[f"{column(joint_name)}_{x}"][row]) for x in "xyz"], abs=1e-9 * size
+            )
 
 
 @pytest.mark.full
@@ -223,6 +226,29 @@ stages:
     assert -last["beam_at_0_5_y"] == pytest.approx(1 / 192, rel=2e-3)  # P L^3 / 192 B for small loads
 
 
+def test_pieces_of_a_cut_strip_have_names_that_no_strip_has(run):
+    """A cut strip s beside one with the name s_1: each bears its own load; loads in two spellings of one place add up."""
+    text = f"""
+material: {ROD}
+strips:
+  s: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}
+  s_1: {{begin: [1, 0, 0], end: [1, 0, 1], normal: [0, 1, 0]}}
+joints: {{A: [s start], B: [s_1 start]}}
+held: {{A: clamped, B: clamped}}
+loads: {{P: {{s at 0.5: [0, -1, 0]}}, Q: {{s at .5: [0, -1, 0], s_1 finish: [0, -1, 0]}}}}
+numbers: {{Q: 0.25}}
+stages:
+  - {{follow: P, to: 0.5}}
+"""
+    branch = run(text)
+    assert list(branch.scene.strip().joints) == ["A", "B", "s at 0.5", "s_1 finish"]
+    last = branch.points[-1]
+    assert (last["F_A_y"], last["F_B_y"]) == pytest.approx((0.75, 0.25), abs=1e-9)
+    assert last["s_at_0_5_y"] == pytest.approx(-0.75 / 24, rel=2e-2) and last["s_1_finish_y"] == pytest.approx(
+        -0.25 / 3, rel=2e-2
+    )
+
+
 def test_what_a_file_holds(run, tmp_path):
     """Columns, words, shapes; the scene is written and read back; the picture has every member."""
     branch = run(CANTILEVER)
@@ -302,6 +328,20 @@ MISTAKES = {
     "stages: [{follow: P, to: 1.0, held: {A: free}}]": "stage 1: held, numbers: those of the scene are the first stage's",
     "stages: [{follow: P, to: 1.0}, {follow: P, to: 2.0, held: {Z: free}}]": "stage 2: held: 'Z' must be one of A, cut, tip",
     "stages: [{follow: P, to: 1.0, limits: {tip_w: [0, 1]}}]": "stage 1: 'tip_w'",
+    "loads: {weight: {tip: [0, 0, -1]}}": "loads: weight: is the name of another number of this network; give another name",
+    "loads: {B1: {tip: [0, 0, -1]}}": "loads: B1: is the name of another number",
+    "loads: {assembly: {tip: [0, 0, -1]}}": "loads: assembly: is the name of another number",
+    "loads: {A_dx: {tip: [0, 0, -1]}}": "loads: A_dx: is the name of another number",
+    "loads: {q0_1: {tip: [0, 0, -1]}}": "loads: q0_1: is the name of another number",
+    "loads: {P: {tip: [0, 0, 1]}, A_x: {tip: [0, 0, 1]}}": "A_x: is the name of two columns; give",
+    "loads: {P: {tip: [0, 0, 1]}, F_A_x: {tip: [0, 0, 1]}}": "F_A_x: is the name of two columns",
+    "loads: {P: {tip: [0, 0, 1]}, index: {tip: [0, 0, 1]}}": "index: is the name of two columns",
+    "loads: {P: {tip: [0, 0, 1]}, error_tip_x: {tip: [0, 0, 1]}}": "error_tip_x: is the name of two columns",
+    "loads: {P: {tip: [0, 0, 1]}, stage: {tip: [0, 0, 1]}}": "stage: is the name of two columns",
+    "loads: {lambda: {tip: [0, 0, -1]}}": "'lambda' is not usable as a name",
+    "loads: {P: {b at 0.5: [0, 0, -1]}, b_at_0_5_y: {tip: [0, 0, -1]}}": "b_at_0_5_y: is the name of two columns",
+    "loads: {P: {b finish: [0, 0, -1]}}": "loads: P: 'b finish' is joined at tip; give tip in its place",
+    "joints: {A: [a start], cut: [a finish], M: [b at 0.5], N: [b at .5], tip: [b finish]}": "joints: N: 'b at 0.5' is joined",
 }
 
 

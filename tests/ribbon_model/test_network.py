@@ -283,7 +283,7 @@ def _stated(**changes):
         ({"members": {"a": Member("beam")}}, "members: a: section: 'beam' must be one of strip"),
         ({"members": {"a": Member(length=0.0)}}, "members: a: length = 0 must be positive"),
         ({"joints": {"K": Joint([JointEnd("c")])}}, "joints: K: member: 'c' must be one of a, b"),
-        ({"joints": {"K": Joint([JointEnd("a"), JointEnd("a")])}}, "joints: K: the start of a is joined twice"),
+        ({"joints": {"K": Joint([JointEnd("a"), JointEnd("a")])}}, "joints: K: 'a start' is joined twice"),
         ({"held": {"Z": CLAMP}}, "held: 'Z' must be one of A, K"),
         ({"loads": {"P": Load([("Z", AXIS, AXIS)])}}, "loads: P: joint: 'Z' must be one of A, K"),
         ({"loads": {"P": Load(moments=[("A", 1.0)])}}, "loads: P: moments: A must be held by a hinge"),
