@@ -57,6 +57,7 @@ from ribbon_model.members import (
     numbers_of,
     straight,
 )
+from ribbon_model.outlines import fans
 from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section
 from ribbon_model.shape import Shape, shape_of
@@ -165,6 +166,8 @@ class Network:
             if times > 1:
                 what = f"loads: {name}" if name in self.loads else name
                 raise ValueError(f"{what}: is the name of another number of this network; give another name")
+        #: How members bear a pressure, and the ends that slide under it.
+        self._outline = fans(self) if "pressure" in self.numbers else ({}, [])
 
     def _check(self) -> None:
         """Raise ValueError for names of nothing, ends that are joined twice, and loads that a floating network cannot bear."""
@@ -245,6 +248,11 @@ class Network:
         part = sum(lengths[:before]) / sum(lengths)
         return f"{name} at {part:.6g}" if 0 < before < len(lengths) else f"{name} {each.end}"
 
+    def joint_at(self, each: JointEnd) -> str:
+        """Return the name of the joint of an end, '' for one that is free."""
+        of = ((name, one) for name, joint in self.joints.items() for one in joint.members)
+        return next((name for name, one in of if (one.member, one.end) == (each.member, each.end)), "")
+
     # --- geometry of the drawing --------------------------------------------------------------------------------------
 
     def drawn(self, each: JointEnd) -> np.ndarray:
@@ -285,10 +293,10 @@ class Network:
         """
         densities: dict[tuple, Callable] = {}
         segments, phases = [], [f"phase_{number}" for number in range(len(self.phases))]
-        for place, member in enumerate(self.members.values()):
+        for place, (name, member) in enumerate(self.members.items()):
             homogeneous = self.sections[member.section].homogeneous
             differs = place if phases else None
-            key = member.section, member.strains, None if homogeneous else member.length, differs
+            key = member.section, member.strains, None if homogeneous else member.length, differs, self._outline[0].get(name)
             if key not in densities:
                 densities[key] = self._hamiltonian(member, place)
             states = (*FRAME, *CENTRELINE, *phases)
@@ -315,7 +323,7 @@ class Network:
         section, length, name = self.sections[member.section], member.length, member.section
         complementary, own = section.hamiltonian(), tuple(section.parameters)
         numbers, full = namedtuple("Numbers", own), [self.full_name(name, number) for number in own]
-        homogeneous, potential = section.homogeneous, self._distributed()
+        homogeneous, potential = section.homogeneous, self._distributed(list(self.members)[place])
         phases, count = self.phases, len(self.members)
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
 
@@ -334,16 +342,17 @@ class Network:
 
         return hamiltonian
 
-    def _distributed(self) -> Callable:
+    def _distributed(self, member: str) -> Callable:
         """Return the potential per length of weight, pressure and field, as a function of (x, directors, p)."""
-        pressure, couple = "pressure" in self.numbers, "field" in self.numbers
+        fan, couple = self._outline[0].get(member), "field" in self.numbers
         weight = loads.distributed(self.weight_direction if "weight" in self.numbers else None, None)
         normal, along, first = self.pressure_normal, self.field_direction, 3 * self.magnetized
 
         def potential(x, d, p):
             value = weight(x, p)
-            if pressure:
-                value = value + p.pressure * ends.along(normal, ends.cross((x.x1, x.x2, x.x3), d[6:9])) / 2
+            if fan is not None:
+                arm = [place - centre for place, centre in zip((x.x1, x.x2, x.x3), fan[1])]
+                value = value + fan[0] * p.pressure * ends.along(normal, ends.cross(arm, d[6:9])) / 2
             if couple:
                 value = value - p.field * ends.along(along, d[first : first + 3])
             return value
@@ -436,9 +445,16 @@ class Network:
 
     @functools.cached_property
     def _end_energy(self) -> Callable | None:
-        """Return the potential of dead forces and moments at joints, as a function of (a, b, p); None without one."""
-        if not self.loads:
+        """Return the potential of dead forces and moments at joints, as a function of (a, b, p); None without one.
+
+        And that of a pressure at ends that slide.
+        """
+        if not self.loads and not self._outline[1]:
             return None
+        slides = [
+            (fan, self._reader(Joint([each])), self._prescribing(name, self.held[name])[1])
+            for each, name, fan in self._outline[1]
+        ]  # fmt: skip
         forces = []
         for number, load in self.loads.items():
             for name, direction, arm in load.forces:
@@ -466,6 +482,9 @@ class Network:
                 value = value - p.assembly * getattr(p, number) * ends.along(direction, place)
             for number, factor, read, angle, frame_of in turns:
                 value = value - p.assembly * getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
+            for (sign, centre), read, place_of in slides:
+                to, place = ([x - c for x, c in zip(r, centre)] for r in (place_of(p), read(a, b, p)[0][1]))
+                value = value - sign * p.assembly * p.pressure * ends.along(self.pressure_normal, ends.cross(to, place)) / 2
             return value
 
         return potential
@@ -718,46 +737,42 @@ class Network:
         The moment is about the place of the joint. Of a network that floats, ``floating`` are those at the first end of the
         first member: zero up to errors.
         """
-        found = {}
-        for name in self.held:
-            joint = self.joints[name]
-            force, moment = self._on_ends(point, joint.members, self.place(point, name))
-            for number, load in self.loads.items():
-                turned = [(where, self._arm(point, joint.members[0], along), arm) for where, along, arm in load.followers]
-                for where, direction, arm in (*load.forces, *turned):
-                    if where == name:
-                        pull = point[ASSEMBLY] * point[number] * np.array(direction)
-                        force, moment = force - pull, moment - np.cross(self._arm(point, joint.members[0], arm), pull)
-                for where, factor in load.moments:
-                    if where == name:
-                        frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
-                        moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ _axes(frame))
-            found[name] = force, moment
-        if self.floats:
-            first = JointEnd(next(iter(self.members)))
-            at = (joint.members for joint in self.joints.values())
-            there = next((those for those in at if (first.member, START) in ((one.member, one.end) for one in those)), [first])
-            found["floating"] = self._on_ends(point, there, self._state(point, first)[4:7])
-        return found
+        if not self.floats:
+            return {name: self._reaction(point, self.joints[name].members, name) for name in self.held}
+        first = JointEnd(next(iter(self.members)))
+        name = self.joint_at(first)
+        return {"floating": self._reaction(point, self.joints[name].members if name else [first], name)}
 
-    def _on_ends(self, point: Point, those: Sequence[JointEnd], origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sum of the forces on members at ends, and of the moments about a place."""
-        force, moment = np.zeros(3), np.zeros(3)
+    def _reaction(self, point: Point, those: Sequence[JointEnd], name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force and moment on ends that meet, about their place, less the loads at the joint of this name."""
+        force, moment, first = np.zeros(3), np.zeros(3), those[0]
+        origin = _at_arm(self._state(point, first)[:7], first.arm)
         for each in those:
             pull, couple, place = self._at_end(point, each)
             force, moment = force + pull, moment + couple + np.cross(place - origin, pull)
+        for number, load in self.loads.items():
+            turned = [(where, self._arm(point, first, along), arm) for where, along, arm in load.followers]
+            for where, direction, arm in (*load.forces, *turned):
+                if where == name:
+                    pull = point[ASSEMBLY] * point[number] * np.array(direction)
+                    force, moment = force - pull, moment - np.cross(self._arm(point, first, arm), pull)
+            for where, factor in load.moments:
+                if where == name:
+                    frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
+                    moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ _axes(frame))
         return force, moment
 
     def _at_end(self, point: Point, each: JointEnd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return force and moment on a member at an end, and the place of that end.
 
-        The multiplier of the centreline is the force without p r x N / 2, as the area under a pressure p is that of a fan from
-        the origin; where a closed structure is joined, this part balances.
+        The multiplier of the centreline is the force without p (r - c) x N / 2, as the area under a pressure p is that of a fan
+        from c; where members are joined, this part balances.
         """
         row = self._state(point, each)
         sign = -1.0 if each.end == START else 1.0
-        fan = point[ASSEMBLY] * point.parameters.get("pressure", 0.0) * np.cross(row[4:7], self.pressure_normal) / 2
-        return sign * (row[11:14] + fan), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
+        side, centre = self._outline[0].get(each.member, (0, row[4:7]))
+        fan = side * point[ASSEMBLY] * point.parameters.get("pressure", 0.0) * np.cross(row[4:7] - centre, self.pressure_normal)
+        return sign * (row[11:14] + fan / 2), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
 
     def place(self, point: Point, joint: str) -> np.ndarray:
         """Return the place (3,) of a joint."""

@@ -337,3 +337,12 @@ def test_a_ball_joint_and_two_sections():
     waves = [math.sqrt(value / B) for B in (1.0, 5.0)]
     assert sum(k / (math.tan(k) - k) for k in waves) == pytest.approx(0, abs=1e-9)
     assert change == (0, 2)
+
+
+def test_nothing_holds_a_network_that_floats_under_loads_at_its_first_joint():
+    """A beam that two opposite forces stretch: what acts there is no reaction."""
+    forces = Load([("A", (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)), ("B", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))])
+    joints = {"A": Joint([JointEnd("beam")]), "B": Joint([JointEnd("beam", FINISH)])}
+    network = Network({"strip": _rod()}, {"beam": Member()}, joints, loads={"P": forces}, numbers={"P": 0.5})
+    reaction = network.reactions(network.first_point()[0])["floating"]
+    assert max(np.abs(part).max() for part in reaction) < 1e-12

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ribbon_model.ends import CLAMPED, FREE, HINGED, prescribed
 from ribbon_model.network import BALL, FINISH, HINGE, START, Network
+from ribbon_model.outlines import fans
 
 #: Steps of differences, and where Newton's method ends.
 _STEP, _ENOUGH = 1e-6, 1e-11
@@ -52,6 +53,7 @@ class Shooting:
         natural = [self.number(member.section, key) for key in ("kappa_n", "kappa_2", "tau_n")]
         names = ("pressure", "weight", "field", "follower_pressure")
         pressure, weight, field, follower = (self.numbers.get(key, 0.0) for key in names)
+        side, centre = fans(net)[0][name] if pressure else (0, np.zeros(3))
         normal, down, along = (np.array(v) for v in (net.pressure_normal, net.weight_direction, net.field_direction))
 
         def rates(s, y):
@@ -60,13 +62,15 @@ class Shooting:
             u1, u2, u3 = change + natural
             turning = np.array([[0, -u3, u2], [u3, 0, -u1], [-u2, u1, 0]])
             d3, magnet = R[:, 2], R[:, net.magnetized]
-            load = weight * down - pressure * np.cross(d3, normal) - follower * R[:, 1]
+            load = weight * down - side * pressure * np.cross(d3, normal) - follower * R[:, 1]
             energy = (
                 change @ (stiffness * change) / 2
                 if math.isfinite(stiffness[1])
                 else (change[0] ** 2 * stiffness[0] + change[2] ** 2 * stiffness[2]) / 2
             )
-            energy += pressure * normal @ np.cross(y[9:12], d3) / 2 - weight * down @ y[9:12] - field * magnet @ along
+            energy += (
+                side * pressure * normal @ np.cross(y[9:12] - centre, d3) / 2 - weight * down @ y[9:12] - field * magnet @ along
+            )
             couple = -np.cross(d3, force) - field * np.cross(magnet, along)
             return np.concatenate([(R @ turning).ravel(), d3, -load, couple, [energy]])
 
@@ -159,8 +163,10 @@ class Shooting:
     def begun(self, states: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray, list[tuple[End, End, float]]]:
         """Frames, unknowns (members, 12) and ends for states (14,) of the beginnings; a network that floats is held so."""
         bases = [_frame(state[:4]) for state in states]
-        fan = self.numbers.get("pressure", 0.0) * np.array(self.network.pressure_normal) / 2
-        forces = [state[11:14] + np.cross(state[4:7], fan) for state in states]  # n of the multiplier of the centreline
+        fan, forces = self.numbers.get("pressure", 0.0) * np.array(self.network.pressure_normal) / 2, []
+        for name, state in zip(self.order, states):  # n of the multiplier of the centreline
+            side, centre = fans(self.network)[0][name] if fan.any() else (0, np.zeros(3))
+            forces.append(state[11:14] + side * np.cross(state[4:7] - centre, fan))
         starts = [[0, 0, 0, *state[4:7], *n, *self._moment(state)] for state, n in zip(states, forces)]
         x = np.array(starts, dtype=float)
         both = [self.ends(*given) for given in zip(self.order, x, bases)]
