@@ -64,8 +64,8 @@ class End:
         'clamped', 'hinged', 'joint' or 'free'.
     axis : tuple of float
         Of a hinge, on the prescribed frame; of a joint, the axis that is fixed in space.
-    director : int
-        Of a joint: the number (0, 1, 2) of the director that stays perpendicular to the axis.
+    director : int or tuple of float
+        Of a joint: the number (0, 1, 2) of the director that stays perpendicular to the axis; or its parts on them.
     held : tuple of vectors
         Directions along which the place is prescribed.
 
@@ -77,7 +77,7 @@ class End:
 
     rotation: str = CLAMPED
     axis: Vector = DIRECTIONS["width"]
-    director: int = 0
+    director: int | Vector = 0
     held: tuple[Vector, ...] = tuple(DIRECTIONS.values())
 
     def __post_init__(self) -> None:
@@ -89,7 +89,8 @@ class End:
         self.held = tuple(unit("held", vector) for vector in self.held)
         if len(self.held) and np.linalg.matrix_rank(np.array(self.held), tol=1e-6) < len(self.held):
             raise ValueError(f"held: the {len(self.held)} directions repeat each other; give independent ones, at most three")
-        if self.rotation == JOINT and abs(self.axis[self.director]) > 1 - 1e-6:
+        self.director = tuple(DIRECTIONS.values())[self.director] if isinstance(self.director, int) else self.director
+        if self.rotation == JOINT and abs(along(self.axis, self.director)) > 1 - 1e-6:
             raise ValueError("joint: the director must not lie along the axis, to which it stays perpendicular")
 
     @property
@@ -162,8 +163,7 @@ def rotation_conditions(end: End) -> Callable[..., tuple]:
     if end.rotation == HINGED:
         pair = perpendicular(end.axis)
         return lambda q, q1: tuple(along(vector, relative(q, q1)[1:]) for vector in pair)
-    axis, first = end.axis, 3 * end.director
-    return lambda q, q1: (along(axis, directors(*relative(q, q1))[first : first + 3]),)
+    return lambda q, q1: (along(end.axis, _turned(end.director, relative(q, q1))),)
 
 
 def place_conditions(end: End) -> Callable[..., tuple]:
@@ -184,15 +184,20 @@ def angle_of(end: End) -> Callable[..., float] | None:
         return hinged
     if end.rotation != JOINT:
         return None
-    first = 3 * end.director
-    zero = unit("axis", [float(i == end.director) - axis[end.director] * axis[i] for i in range(3)])
+    zero = unit("axis", [x - along(axis, end.director) * a for x, a in zip(end.director, axis)])
     side = cross(axis, zero)
 
     def joint(q, q1):
-        director = directors(*relative(q, q1))[first : first + 3]
+        director = _turned(end.director, relative(q, q1))
         return math.atan2(along(side, director), along(zero, director))
 
     return joint
+
+
+def _turned(vector: Vector, q) -> list:
+    """Return a vector that is fixed on the directors of a quaternion."""
+    d = directors(*q)
+    return [along(vector, d[i::3]) for i in range(3)]
 
 
 def along(vector: Vector, components):

@@ -10,17 +10,19 @@ import functools
 import keyword
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.columns import OWN
 from branches.scene.fields import StepConfig, Strict
-from branches.scene.open_strip import Direction, EndWords, FollowConfig, OpenMesh, StagedScene, finite, numbers_of
+from branches.scene.open_strip import Axis, EndWords, FollowConfig, OpenMesh, OwnDirection, StagedScene, finite, numbers_of
 from ribbon_model.changed_supports import replacing
-from ribbon_model.ends import DIRECTIONS, FREE_END, End
+from ribbon_model.ends import DIRECTIONS, FREE_END, LOOSE, End
+from ribbon_model.equilibrium import directors
 from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, frame_along, straight
 from ribbon_model.network import FOLLOWER, POTENTIALS, Network
 from ribbon_model.section import Section, section_of
@@ -48,8 +50,8 @@ class StripConfig(Strict):
     begin: Vector | None = Field(None, description="where it begins")
     end: Vector | None = Field(None, description="where it ends")
     after: str | None = Field(None, description="the strip that it goes on from, in the same direction")
-    along: Direction | None = Field(None, description="direction in which it begins")
-    normal: Direction | None = Field(None, description="direction of its normal where it begins, as near as it can be")
+    along: Axis | None = Field(None, description="direction in which it begins")
+    normal: Axis | None = Field(None, description="direction of its normal where it begins, as near as it can be")
     length: float | None = Field(None, gt=0, description="its length, without an end")
     bend: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing bends about its width, in radians")
     twist: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing is twisted")
@@ -77,12 +79,12 @@ class JointConfig(Strict):
     """Ends that meet."""
 
     strips: list[str] = Field(min_length=1, max_length=100, description=f"each {_PLACES}")
-    hinge: Direction | None = Field(None, description="axis of a hinge, which turns with the first strip")
+    hinge: OwnDirection | None = Field(None, description="axis of a hinge, which turns with the first strip")
     ball: bool = Field(False, description="the strips turn freely against each other")
     angle: dict[str, float | str] = Field(
         default_factory=dict, description="angles by which ends are turned against the drawing, or names of numbers"
     )
-    about: Direction = Field(DIRECTIONS["width"], description="axis of these angles")
+    about: OwnDirection = Field("width", description="axis of these angles")
     arm: dict[str, Vector] = Field(default_factory=dict, description="from an end to the joint, on the directors of the end")
 
     @model_validator(mode="after")
@@ -136,11 +138,9 @@ class NetworkStageConfig(FollowConfig):
 class NetworkDirections(Strict):
     """Where loads point to."""
 
-    weight: Direction = (0.0, -1.0, 0.0)
-    pressure: Direction = Field(
-        (1.0, 0.0, 0.0), description="the normal of the plane, about which the strips go around an area"
-    )
-    field: Direction = Field((0.0, 1.0, 0.0), description="of a uniform field on magnetized strips")
+    weight: Axis = (0.0, -1.0, 0.0)
+    pressure: Axis = Field((1.0, 0.0, 0.0), description="the normal of the plane, about which the strips go around an area")
+    field: Axis = Field((0.0, 1.0, 0.0), description="of a uniform field on magnetized strips")
 
 
 class NetworkScene(StagedScene):
@@ -226,11 +226,34 @@ class NetworkScene(StagedScene):
     def _held(self, stage: int) -> tuple[dict[str, End], tuple[str, ...]]:
         """Return what is held in a stage, and the joints at which that has changed since the first one."""
         if stage == 1:
-            return {name: end.end() for name, end in self.held.items()}, ()
+            return {name: end.end(self.axes_at(name)) for name, end in self.held.items()}, ()
         one = self.stages[stage - 1]
         held, changed = self._held(one.stage or stage - 1)
-        held = held | {name: end.end() for name, end in one.held.items()}
+        held = held | {name: end.end(self.axes_at(name)) for name, end in one.held.items()}
         return {name: end for name, end in held.items() if end != FREE_END}, tuple(dict.fromkeys((*changed, *one.held)))
+
+    def axes_at(self, joint: str) -> Mapping[str, Vector]:
+        """Return width, normal and tangent of the first strip at a joint as drawn; the largest part of each is positive."""
+        if joint not in self.joints:
+            return DIRECTIONS
+        name, end, part = _parsed(f"joints: {joint}", self.joints[joint].strips[0], self._drawn)
+        part = {START: 0.0, FINISH: 1.0}.get(end, part)
+        rows = np.reshape(directors(*self._drawn[name].drawn([part * self._drawn[name].length])[0, :4]), (3, 3))
+        rows = np.where(np.abs(rows) < LOOSE, 0.0, rows)
+        largest = [row[np.argmax(np.abs(row) > np.abs(row).max() - LOOSE)] for row in rows]
+        return {word: tuple(map(float, row * np.sign(one) + 0.0)) for word, row, one in zip(DIRECTIONS, rows, largest)}
+
+    def told_axes(self, stage: int) -> Iterator[str]:
+        """Yield what the words of directions at joints mean that a stage brings."""
+        said = {
+            f"held: {name}": (name, end.words) for name, end in (self.stages[stage - 1] if stage > 1 else self).held.items()
+        }
+        for name, joint in self.joints.items() if stage == 1 else ():
+            used = [field for field in ("hinge", "about") if isinstance(getattr(joint, field), str)]
+            said[f"joints: {name}"] = name, {field: getattr(joint, field) for field in used if field != "about" or joint.angle}
+        for where, (name, words) in said.items():
+            for field, word in words.items():
+                yield f"{where}: {field}: {word} is the direction ({', '.join(f'{x:.6g}' for x in self.axes_at(name)[word])})"
 
     @functools.cached_property
     def found_names(self) -> tuple[str, ...]:
@@ -248,7 +271,7 @@ class NetworkScene(StagedScene):
 
     def _network(self, held: dict[str, End], changed: tuple[str, ...]) -> Network:
         sections = self._sections()
-        members, joints = self._drawn(sections), {}
+        members, joints = dict(self._drawn), {}
         cuts: dict[str, list[float]] = {}
         for where, place in self._places():
             name, end, part = _parsed(where, place, members)
@@ -262,13 +285,15 @@ class NetworkScene(StagedScene):
                 del members[name]
                 members.update(zip(pieces[name], member.cut(parts)))
         for name, joint in self.joints.items():
+            axes = self.axes_at(name)
+            about, hinge = axes.get(joint.about, joint.about), axes.get(joint.hinge, joint.hinge or axes["width"])
             ends = [
-                JointEnd(piece, end, joint.angle.get(place, 0.0), joint.about, joint.arm.get(place, (0.0, 0.0, 0.0)), goes_on)
+                JointEnd(piece, end, joint.angle.get(place, 0.0), about, joint.arm.get(place, (0.0, 0.0, 0.0)), goes_on)
                 for place in joint.strips
                 for piece, end, goes_on in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
             ]
             kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
-            joints[name] = Joint(ends, kind, joint.hinge or DIRECTIONS["width"])
+            joints[name] = Joint(ends, kind, hinge)
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
         for name in changed:
             if name not in joints:
@@ -303,9 +328,11 @@ class NetworkScene(StagedScene):
                 raise ValueError(str(error) if str(error).startswith(where) else f"{where}: {error}") from error
         return found
 
-    def _drawn(self, sections: dict[str, Section]) -> dict[str, Member]:
-        """Return the members; each strip must come after the one that it goes on from."""
+    @functools.cached_property
+    def _drawn(self) -> dict[str, Member]:
+        """The members; each strip must come after the one that it goes on from."""
         found: dict[str, Member] = {}
+        sections = self._sections()
         for name, strip in self.strips.items():
             section = strip.section or (next(iter(sections)) if len(sections) == 1 else None)
             if section not in sections:
@@ -349,7 +376,7 @@ class NetworkScene(StagedScene):
     @functools.cached_property
     def longest(self) -> float:
         """The length of the longest strip."""
-        return max(member.length for member in self._drawn(self._sections()).values())
+        return max(member.length for member in self._drawn.values())
 
     @property
     def law_name(self) -> str:

@@ -69,6 +69,7 @@ class NetworkStage(OpenStage):
         notes = super().notes(run)
         if self.number == 1 and not self.problem.has_index:
             notes.insert(0, "loads that follow the strips have no energy: there is no index, and flutter is not looked for")
+        notes[:0] = [f"stage {self.number}: {told}" for told in self.scene.told_axes(self.number)]
         if self._how:
             notes.insert(0, f"stage {self.number}: the first state was found {self._how}")
         return notes

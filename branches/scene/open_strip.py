@@ -11,7 +11,7 @@ import itertools
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -20,7 +20,7 @@ from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Stric
 from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text
-from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
+from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, Vector, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.plate import RIGIDITIES
 from ribbon_model.section import Section, section_of
@@ -42,14 +42,17 @@ _NATURAL = {(1, 0): "L", (-1, 0): "1/L", (-1, 1): "B/L", (-2, 1): "B/L²", (-3, 
 #: Laws of a strip with dimensions; the first one if none is given.
 _OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
 
-Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value))]
+#: A direction: in words of the first end of an open strip, of the strip at a joint, which keeps its word, and of space.
+Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value, DIRECTIONS))]
+OwnDirection = Annotated[tuple[float, float, float] | str, BeforeValidator(lambda v: _direction(v, {n: n for n in DIRECTIONS}))]
+Axis = Annotated[tuple[float, float, float], BeforeValidator(lambda v: _direction(v, dict(zip("xyz", DIRECTIONS.values()))))]
 
 
-def _direction(value: object) -> tuple[float, float, float]:
-    if isinstance(value, str) and value in DIRECTIONS:
-        return DIRECTIONS[value]
+def _direction(value: object, words: Mapping[str, Any]) -> Any:
+    if isinstance(value, str) and value in words:
+        return words[value]
     if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
-        raise ValueError(f"must be {', '.join(DIRECTIONS)} or three numbers, not {value!r}")
+        raise ValueError(f"must be {', '.join(words)} or three numbers, not {value!r}")
     return unit("direction", value)
 
 
@@ -57,13 +60,13 @@ class EndConfig(Strict):
     """What is held at an end."""
 
     rotation: Literal["clamped", "hinged", "joint", "free"] = "clamped"
-    about: Direction | None = Field(None, description="axis of a hinge, or the axis of a joint that is fixed in space")
+    about: OwnDirection | None = Field(None, description="axis of a hinge, or the axis of a joint that is fixed in space")
     perpendicular: Literal["width", "normal", "tangent"] | None = Field(
         None, description="direction of the strip that a joint keeps perpendicular to its axis"
     )
     place: Literal["held", "free"] = "held"
-    slides_along: Direction | None = None
-    slides_in_plane: Direction | None = Field(None, description="the normal of the plane")
+    slides_along: OwnDirection | None = None
+    slides_in_plane: OwnDirection | None = Field(None, description="the normal of the plane")
 
     @model_validator(mode="after")
     def _fits(self):
@@ -77,15 +80,18 @@ class EndConfig(Strict):
         self.end()
         return self
 
-    def end(self) -> End:
-        """Return the end."""
+    def end(self, axes: Mapping[str, Vector] = DIRECTIONS) -> End:
+        """Return the end; ``axes`` are the directions of the strip there."""
+        about, along, plane = (axes.get(one, one) for one in (self.about or "width", self.slides_along, self.slides_in_plane))
         held = tuple(DIRECTIONS.values()) if self.place == "held" else ()
-        if self.slides_along is not None:
-            held = perpendicular(self.slides_along)
-        if self.slides_in_plane is not None:
-            held = (self.slides_in_plane,)
-        director = list(DIRECTIONS).index(self.perpendicular) if self.perpendicular else 0
-        return End(self.rotation, self.about or DIRECTIONS["width"], director, held)
+        held = perpendicular(along) if along else (plane,) if plane else held
+        return End(self.rotation, about, axes[self.perpendicular or "width"], held)
+
+    @property
+    def words(self) -> dict[str, str]:
+        """The fields that name directions of the strip."""
+        names = ("about", "perpendicular", "slides_along", "slides_in_plane")
+        return {name: word for name in names if isinstance(word := getattr(self, name), str)}
 
 
 def _belongs(field: str, rotations: str, value: object, rotation: str) -> str:

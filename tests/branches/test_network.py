@@ -249,6 +249,35 @@ stages:
     )
 
 
+#: Roorda's frame: a column and a beam of equal lengths, both on hinges, in the plane of two axes (u, v).
+ROORDA = """
+material: {{law: rod, B1: 1.0, B2: 4.0, C: 0.8}}
+strips:
+  column: {{begin: {o}, end: {u}, normal: {v}}}
+  beam: {{begin: {u}, end: {uv}, normal: {u}}}
+joints: {{A: [column start], K: [column finish, beam start], B: [beam finish]}}
+held: {{A: hinged, B: hinged}}
+loads: {{P: {{K: {down}}}}}
+numbers: {{P: 13.0}}
+stages:
+  - {{follow: P, to: 14.5}}
+"""
+
+
+@pytest.mark.parametrize("plane", ["yz", "xy"])
+def test_hinges_are_those_of_the_strip_in_whatever_plane_it_is_drawn(tmp_path, capsys, plane):
+    """A moment 1 at K turns the end of the column by (1 - k / tan k) / k**2, k**2 = P, and that of the beam by 1/3."""
+    u, v = (np.eye(3, dtype=int)["xyz".index(axis)] for axis in plane)
+    text = ROORDA.format(o=[0, 0, 0], u=u.tolist(), v=v.tolist(), uv=(u + v).tolist(), down=(-u).tolist())
+    run_scene(parse(text, "scene.yaml"), tmp_path / "frame.h5", Display())
+    branch = read_branch(tmp_path / "frame.h5")
+    ((value, error, *changes),) = _events(branch, "BP", "P")
+    k = brentq(lambda k: (1 - k / math.tan(k)) / k**2 + 1 / 3, 3.2, 4.4, xtol=1e-15)
+    assert value == pytest.approx(k**2, abs=1e-9) and changes == [0, 1]
+    axis = np.cross(u, v)
+    assert f"held: A: about: width is the direction ({', '.join(str(abs(x)) for x in axis)})" in capsys.readouterr().out
+
+
 def test_what_a_file_holds(run, tmp_path):
     """Columns, words, shapes; the scene is written and read back; the picture has every member."""
     branch = run(CANTILEVER)
@@ -319,6 +348,9 @@ MISTAKES = {
     "joints: {A: [c start]}": "joints: A: 'c start' must be a strip and",
     "joints: {A: {strips: [a start], ball: true, hinge: [1, 0, 0]}}": "joints.A: hinge, ball: give one of them",
     "held: {Z: clamped}": "held: 'Z' must be one of A, cut, tip",
+    "strips: {a: {begin: [0, 0, 0], along: tangent, normal: [0, 1, 0], length: 1.0}}": "a.along: must be x, y, z or",
+    "directions: {weight: normal}": "directions.weight: must be x, y, z or three numbers, not 'normal'",
+    "held: {A: {slides_along: x}}": "held.A.slides_along: must be width, normal, tangent or three numbers, not 'x'",
     "held: {A: welded}": "held.A: 'welded' must be clamped, hinged, ball joint, free",
     "loads: {P: {tip: {moment: 1.0}}}": "loads: P: moments: tip must be held by a hinge",
     "loads: {P: {tip: {force: [0, 0, 1], moment: 1.0}}}": "loads.P.tip: force, moment: give one of them",
@@ -348,7 +380,7 @@ MISTAKES = {
 @pytest.mark.parametrize("change", MISTAKES)
 def test_a_mistake_is_one_sentence(change):
     field = change.partition(":")[0]
-    text = re.sub(rf"^{field}:.*?(?=^\w|\Z)", change + "\n", CANTILEVER, flags=re.M | re.S)
+    text = re.sub(rf"^{field}:.*?(?=^\w|\Z)", change + "\n", CANTILEVER + "directions: {}\n", flags=re.M | re.S)
     with pytest.raises(ConfigError) as raised:
         parse(text, "scene.yaml")
     assert MISTAKES[change] in str(raised.value)
