@@ -39,7 +39,7 @@ from contin import (
     solve,
     trace,
 )
-from contin.lowlevel import Collocation, Continuation, Label, Undetermined, locate_branch_point, point_of
+from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
@@ -72,10 +72,9 @@ MOVES = ("dx", "dy", "dz")
 POTENTIALS = ("weight", "pressure", "field")
 #: The same of a load without an energy: a pressure that stays normal to strips.
 FOLLOWER = "follower_pressure"
-#: Why a state is not determined.
+#: Why a state is not determined; before it, what moves.
 MECHANISM = (
-    "joints: the network can move, or a strip can turn about itself, without a change of energy, so nothing determines its "
-    "state; hold more, or join rigidly"
+    "can move, or turn about itself, without a change of energy, so nothing determines the state; hold more, or join rigidly"
 )
 #: Why forces are not determined.
 UNDETERMINED = (
@@ -84,6 +83,11 @@ UNDETERMINED = (
 )
 #: The mesh of first states: a coarse one has solutions that are none.
 _MESH = MeshControl(1e-9, max_intervals=200)
+#: Most points of the way from the drawing without stress. Where a gap cannot close, forces grow without end: 60 points of a
+#: portal took 9 s, 200 more than two minutes.
+_MOST = 60
+#: Strips move in a mode if they move by more than this part of its largest displacement.
+_MOVES = 1e-3
 #: A state that Newton's method finds is that of the drawing if it is nearer than this; others may be anywhere.
 _NEAR = 0.3
 
@@ -532,6 +536,7 @@ class Network:
         ProblemError
             Nothing determines the state.
         """
+        self._check_reach()
         options = {"intervals": intervals, "degree": degree, **options}
         is_drawn = guess is None
         guess = self.guess() if is_drawn else guess
@@ -546,11 +551,13 @@ class Network:
             drawn = self.state_near(guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
         except ContinError as error:
             singular = is_drawn and isinstance(error, ConvergenceError)  # the drawing is a solution: what fails is the matrix
-            raise ProblemError(MECHANISM if singular else self._reason(error)) from first
-        way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False)
+            raise ProblemError(self._mechanism() if singular else self._reason(error)) from first
+        way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
             told = f": {self._reason(first)}" if first else ""
             nearest = max(way, key=lambda point: point[ASSEMBLY])
+            left = [f"{(1 - nearest[ASSEMBLY]) * size:.3g} at {name}" for name, size in self.gaps.items()]
+            told = f" (gaps are left of {', '.join(left)}){told}" if left else told
             reason = OutOfReach(
                 f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
                 f"{nearest[ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
@@ -560,7 +567,72 @@ class Network:
         try:
             return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
         except ContinError as error:  # the way has come there: what fails is the matrix
-            raise ProblemError(MECHANISM) from error
+            raise ProblemError(self._mechanism(way[-1])) from error
+
+    def _check_reach(self) -> None:
+        """Raise ProblemError for joints that are held farther apart than the strips between them are long."""
+        numbers = SimpleNamespace(**self.parameters)
+        places = {name: np.array(self._prescribing(name, end)[1](numbers)) for name, end in self.held.items()}
+        ends_of = [(name, each) for name, joint in self.joints.items() for each in joint.members]
+        arms = {(each.member, each.end): (name, float(np.linalg.norm(each.arm))) for name, each in ends_of}
+        both = [(arms.get((name, START)), arms.get((name, FINISH)), one.length) for name, one in self.members.items()]
+        pairs = [(a[0], b[0], a[1] + length + b[1]) for a, b, length in both if a and b]
+        for first in self.held:
+            reach = {first: 0.0}
+            for _ in self.joints:  # shortest ways along strips
+                for a, b, length in pairs:
+                    for one, other in ((a, b), (b, a)):
+                        if one in reach:
+                            reach[other] = min(reach.get(other, math.inf), reach[one] + length)
+            for name in self.held:
+                fixed = [np.array(self.held[joint].held).reshape(-1, 3) for joint in (first, name)]
+                free = np.hstack([np.eye(3) - np.linalg.pinv(rows) @ rows for rows in fixed])  # where they slide to
+                away = places[name] - places[first]
+                apart = float(np.linalg.norm(away - free @ np.linalg.lstsq(free, away, rcond=None)[0]))
+                if apart > reach.get(name, math.inf) * (1 + LOOSE):
+                    raise ProblemError(
+                        f"held: {first} and {name} are {apart:.4g} apart, and the strips between them {reach[name]:.4g} long; "
+                        "draw longer strips, or hold less"
+                    )
+
+    def _mechanism(self, point: Point | None = None) -> str:
+        """Return which strips move without a change of energy in a state, by default in the drawing without stress."""
+        problem = self.problem
+        values = {**problem.parameters, **self.parameters, ASSEMBLY: 0.0}
+        if not problem.has_index:
+            return f"joints: the network {MECHANISM}"
+        if point is None:
+            system = problem.discretized(problem.multipliers, values, None, np.linspace(0, 1, 11), 4)
+            states = np.zeros((len(system.nodes), len(problem.state_names)))
+            for member, places in zip(self.members.values(), self.places):
+                states[:, places[:7]] = member.drawn(member.length * system.nodes)
+            point = point_of(system, system.pack(states, values))
+        variation = point.second_variation()
+        sizes, free = np.abs(variation.eigenvalues), self._free_turns
+        count = max(1, int(np.count_nonzero(sizes < levels.LOCATED * sizes.max())))
+        idle = [name for name in (*self.loads, "field") if name in self.numbers or name in self.loads]
+        if self.floats and idle and not any(point.parameters[name] for name in idle) and count == 3 - len(free):
+            return (
+                f"loads: a network that floats is turned by its loads, and {' = '.join(idle)} = 0 does not determine how; "
+                f"begin with another value, as in numbers: {{{idle[0]}: {self._sizes['sigma'] / 1000:.1g}}}"
+            )
+        modes = variation.modes(count, np.linspace(0, 1, 21))[:, :, [places[:7] for places in self.places]]
+        moved = np.abs(modes / ([1.0] * 4 + [self.longest] * 3)).max(axis=(0, 1, 3))
+        names = dict.fromkeys(name.partition(" ")[0] for name, x in zip(self.members, moved) if x > _MOVES * moved.max())
+        return f"joints: {', '.join(names)} {MECHANISM}"
+
+    @property
+    def longest(self) -> float:
+        """The length of the longest member."""
+        return max(member.length for member in self.members.values())
+
+    @property
+    def gaps(self) -> dict[str, float]:
+        """The largest gap of the drawing at each joint that has one."""
+        found: dict[str, float] = {}
+        for (name, _), gap in self._gaps.items():
+            found[name] = max(found.get(name, 0.0), math.hypot(*gap))
+        return found
 
     def state_near(self, guess: object, values: Mapping[str, float] | None = None, **options: Any) -> Point:
         """Return the state that Newton's method finds from a guess.
@@ -636,45 +708,51 @@ class Network:
         if not isinstance(guess, list):
             return 0.0
         states, t, away = point.system.states(point.x), point.system.nodes, 0.0
-        length = max(member.length for member in self.members.values())
         for member, places, begun in zip(self.members.values(), self.places, guess):
             drawn = np.array([np.asarray(begun(member.length * s) if callable(begun) else begun)[:7] for s in t])
-            change = np.abs(states[:, places[:7]] - drawn) / np.repeat([1.0, length], [4, 3])
+            change = np.abs(states[:, places[:7]] - drawn) / np.repeat([1.0, self.longest], [4, 3])
             away = max(away, float(change.max()))
         return away
 
     def _determined(self, point: Point) -> Point:
         """Return a state; raise ProblemError where something can move without a change of energy, if loads have one."""
         if self.problem.has_index and not point.second_variation().is_determined:
-            raise ProblemError(MECHANISM)
+            raise ProblemError(self._mechanism(point))
         return point
 
-    @staticmethod
-    def _reason(error: ContinError) -> str:
+    def _reason(self, error: ContinError) -> str:
         """Return why no state was found, in the words of networks."""
+        t = np.linspace(0, 1, 101)
+        for name, member in self.members.items():
+            if told := law_end.at_guess(self.sections[member.section], t, member.drawn(member.length * t)[:, :4]):
+                return f"strips: {name.partition(' ')[0]}: {told}"
         text = str(error)
-        return MECHANISM if Undetermined.MODE in text else UNDETERMINED if Undetermined.CONDITIONS in text else text
+        return self._mechanism() if Undetermined.MODE in text else UNDETERMINED if Undetermined.CONDITIONS in text else text
 
     @property
     def _sizes(self) -> dict[str, float]:
         """Sizes of states and numbers: what is small in a first state, or round-off, is not small by its nature.
 
-        Places have the size of the longest member, forces and moments that of the smallest stiffness.
+        Places have the size of the longest member L, forces and moments B/L^2 and B/L with the smallest stiffness B.
         """
         stiffness = [
             self.parameters[self.full_name(name, number)]
             for name, section in self.sections.items() for number in section.stiffnesses
         ]  # fmt: skip
-        force, length = min(stiffness, default=1.0), max(member.length for member in self.members.values())
+        length = self.longest
+        moment = min(stiffness, default=1.0) / length
+        force = moment / length
         own = set(self._of_sections)
         found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": force}
         found |= dict.fromkeys([name for name in self._prescribed if name.endswith(MOVES)], length)
-        found |= dict.fromkeys([name for name in (*self.loads, *POTENTIALS, FOLLOWER) if name in found], force)
+        found |= dict.fromkeys(self.loads, force) | dict.fromkeys(
+            [name for name in (*POTENTIALS, FOLLOWER) if name in found], force / length
+        )
         for number in range(len(self.members)):
             behind = f"_{number}" if len(self.members) > 1 else ""
             phases = [f"phase_{number}" for number in range(len(self.phases))]
-            for names, size in ((FRAME, 1.0), (CENTRELINE, length), (phases, 1.0)):
-                found |= {f"{name}{behind}": size for name in names} | {f"lam_{name}{behind}": force for name in names}
+            for names, size, push in ((FRAME, 1.0, moment), (CENTRELINE, length, force), (phases, 1.0, force)):
+                found |= {f"{name}{behind}": size for name in names} | {f"lam_{name}{behind}": push for name in names}
         return found
 
     @property

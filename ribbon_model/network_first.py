@@ -53,7 +53,7 @@ def downhill(network: Network, point: Point) -> list:
 
     drawing = network_segments.cut(network, point.system, point.x, SEGMENTS)
     chain = replace(drawing, numbers={**drawing.numbers, ASSEMBLY: 1.0}).moved(np.zeros(drawing.size))
-    way = descent.descend(chain, longest=descent.LONGEST / max(member.length for member in network.members.values()))
+    way = descent.descend(chain, longest=descent.LONGEST / network.longest)
     if not way.rests:
         raise ValueError("the network of segments does not come to rest")
     return [functools.partial(_at, piece) for piece in way.end.pieces]

@@ -71,7 +71,10 @@ class NetworkStage(OpenStage):
             notes.insert(0, "loads that follow the strips have no energy: there is no index, and flutter is not looked for")
         notes[:0] = [f"stage {self.number}: {told}" for told in self.scene.told_axes(self.number)]
         if self._how:
-            notes.insert(0, f"stage {self.number}: the first state was found {self._how}")
+            notes[:0] = [f"stage {self.number}: the first state was found {self._how}"] + [
+                f"stage {self.number}: the drawing has a gap of {gap:.4g} at {name}, which was closed"
+                for name, gap in self.strip.gaps.items()
+            ]
         return notes
 
     # --- columns --------------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.network import column
 from branches.scene.parse import dump, load, parse
+from contin import trace
 from ribbon_model.descent import past
 from ribbon_model.network import START
 from tests.ribbon_model.test_network_independent import Shooting
@@ -644,3 +645,65 @@ def test_the_page_of_a_network(shipped):
     for strip, part in zip(places.transpose(1, 0, 2), shown.parts):  # moved by one vector for all points of the page
         ends = 2 * np.pi * (part.centreline[-1] - part.centreline[0])
         assert strip[-1] - strip[0] == pytest.approx(ends, abs=1e-3)
+
+
+# --- first states that are not there ------------------------------------------------------------------------------------
+
+#: A portal of three rods; its right column is drawn from a height up.
+_PORTAL = """
+material: {{law: {law}}}
+strips:
+  left: {{begin: [0, 0, 0], end: [0, {L}, 0], normal: [0, 0, 1]}}
+  beam: {{begin: [0, {L}, 0], end: [0, {L}, {L}], normal: [0, 1, 0]}}
+  right: {{begin: [0, {foot}, {L}], end: [0, {head}, {L}], normal: [0, 0, 1]}}
+joints: {{A: [left start], B: [left finish, beam start], C: {C}, D: [right start]}}
+held: {{A: clamped, D: {D}}}
+loads: {{P: {{B: [0, -1, 0], C: [0, -1, 0]}}}}
+stages:
+  - {{follow: P, to: {to}}}
+"""
+_STIFF = "rod, B1: 1.0, B2: 4.0, C: 0.8"
+_JOINED = "[beam finish, right finish]"
+
+
+def _portal(law=_STIFF, L=1.0, up=0.0, C=_JOINED, D="clamped", to=0.1):
+    return _PORTAL.format(law=law, L=L, foot=up, head=up + L, C=C, D=D, to=to)
+
+
+@pytest.mark.parametrize(
+    "text, sentence",
+    [
+        (
+            _portal(up=6.0),
+            "held: A and D are 6.083 apart, and the strips between them 3 long; draw longer strips, or hold less",
+        ),
+        (
+            _portal(C=f"{{strips: {_JOINED}, ball: true}}", D="{rotation: free}"),
+            "joints: right can move, or turn about itself, without a change of energy",
+        ),
+        (_portal("ribbon, nu: 0.3"), "strips: left: the law 'ribbon' has no value where the bending vanishes"),
+        (
+            f"material: {{law: {_STIFF}}}\nstrips: {{a: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}}}\n"
+            "joints: {A: [a start], B: [a finish]}\nloads: {P: {A: [0, 0, -1], B: [0, 0, 1]}}\n"
+            "stages:\n  - {follow: P, to: 1.0}\n",
+            "P = 0 does not determine how; begin with another value, as in numbers: {P: 0.0008}",
+        ),
+    ],
+)
+def test_why_there_is_no_first_state(text, sentence, tmp_path):
+    with pytest.raises(ConfigError, match=re.escape(sentence)):
+        run_scene(parse(text, "scene.yaml"), tmp_path / "result.h5", Display(silent=True))
+    assert not (tmp_path / "result.h5").exists()
+
+
+def test_a_gap_that_was_closed_is_said(tmp_path, capsys):
+    run_scene(parse(_portal(up=0.02), "scene.yaml"), tmp_path / "result.h5", Display())
+    assert "stage 1: the drawing has a gap of 0.02 at C, which was closed" in capsys.readouterr().out
+
+
+def test_a_frame_of_a_millimetre_buckles_as_one_of_a_metre():
+    """k L cot(k L) = -6: L = 1e-3 and B = 1e-9, as in m and N m^2, have forces of 1e-3."""
+    network = parse(_portal("rod, B1: 1.0e-9, B2: 4.0e-9, C: 0.8e-9", 1e-3) + "numbers: {P: 0.007}\n", "scene.yaml").strip()
+    branch = trace(network.first_point()[0], free=["P"], limits={"P": (0.007, 0.0076)}, progress=False)
+    (point,) = branch.labelled("BP")
+    assert (point["P"], point.index_change) == (pytest.approx(1e-3 * 2.71645974768613**2, rel=1e-9), (0, 1))
