@@ -21,7 +21,7 @@ from contin.core.state import Stop
 from contin.core.trial import Event, Trial, linearization
 from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
-from contin.levels import APART, CORRECTED
+from contin.levels import APART, CORRECTED, TINY
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
@@ -36,6 +36,10 @@ _SLOW = 0.05
 _NEAR = 0.1
 #: ... which counts where that takes at least this part of the period.
 _MOSTLY = 0.5
+#: The rate at which the parameter approaches its limit is measured over this part of the period, ...
+_PART = 0.01
+#: ... and must fit an eigenvalue: dp/dT changes by 2 to the power 1 +- this where exp(-k T) does by 2.
+_MISFIT = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,28 +194,41 @@ class Limit:
 def limit_of_parameter(system: CycleEquations, x: Array, place: RestingPlace) -> Limit | None:
     """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
 
-    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, over the number of
-    passes in a period, so that the limit is p + (dp/dT) / k. The error is its difference from that of a cycle with half the
-    rate dp/dT, where the next exponentials are larger, and from that on the mesh halved. Of a complex leading eigenvalue p
-    oscillates, and is not extrapolated.
+    Near a saddle p - limit = A exp(-k T), so that the limit is p + (dp/dT) / k; k is an eigenvalue's real part, up to its sign,
+    over the number of passes in a period. It is the eigenvalue nearest to the imaginary axis, unless the orbit has no part in
+    its direction: the one is taken that fits how dp/dT changes with T. Near a fold or a branch point of equilibria, k goes to
+    zero with the distance, and p tends to its limit like a power of T. There is no extrapolation where no k fits, nor where k
+    at the limit is so different that exp(-k T) is, too. The error is what the misfit, the mesh, halved, and Newton's method
+    leave. Of a complex leading eigenvalue p oscillates, and is not extrapolated.
     """
     if place.fold:
         return None
-    eigenvalues = place.eigenvalues
-    (name, *_), rates = [name for name in system.free if name != PERIOD], np.abs(eigenvalues.real)
-    leading = eigenvalues[rates.argmin()]
-    if leading.imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
+    eigenvalues, name = place.eigenvalues, next(name for name in system.free if name != PERIOD)
+    rates, period = np.abs(eigenvalues.real) / (system.order * place.passes), system.duration(x)
+    if eigenvalues[rates.argmin()].imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
         return None
-    k = float(rates.min()) / (system.order * place.passes)
+    at, size = system.parameter_index(name), system.free_scales[system.free.index(name)]
+    finer, carry = system.refined()
     try:
-        value = _extrapolated(system, x, (name, k), 0.0)
-        shorter = _extrapolated(system, x, (name, k), np.log(2) / k)
-        finer, carry = system.refined()
-        better = _extrapolated(finer, carry(x), (name, k), 0.0)
+        here, slope = _at_period(system, x, at, 0.0)
+        fitted = np.log(max(_at_period(system, x, at, _PART * period)[1] / slope, TINY)) / (_PART * period)
+        which = np.argmin(np.where(eigenvalues.imag == 0, np.abs(rates - fitted), np.inf))
+        k = rates[which]
+        steeper = _at_period(system, x, at, np.log(2) / k)[1]
+        better, flat = _at_period(finer, carry(x), finer.parameter_index(name), 0.0)
     except ConvergenceError:
         return None
-    error = abs(value - shorter) + abs(value - better) + np.finfo(float).eps * abs(value)
-    return Limit(name, better, float(error)) if np.isfinite(error) else None
+    limit, there = better + flat / k, x.copy()
+    there[at] = limit / size
+    found = equilibrium_beside(system, there)
+    if found is None:
+        return None
+    drift = period * abs(abs(found[1][which].real) / (system.order * place.passes) - k)
+    misfit, reach = abs(np.log2(max(steeper / slope, TINY)) - 1) + drift, abs(slope) / k
+    if misfit > _MISFIT and reach > CORRECTED * size:
+        return None
+    error = misfit * reach + abs(here + slope / k - limit) + CORRECTED * size
+    return Limit(name, float(limit), float(error)) if np.isfinite(error) else None
 
 
 def explained(system: CycleEquations, stop: Stop, x: Array) -> Stop:
@@ -230,19 +247,18 @@ def explained(system: CycleEquations, stop: Stop, x: Array) -> Stop:
     return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)
 
 
-def _extrapolated(system: CycleEquations, x: Array, law: tuple[str, float], less: float) -> float:
-    """Return p + (dp/dT) / k, for ``law`` (p, k), at a period that is shorter by some time.
+def _at_period(system: CycleEquations, x: Array, at: int, less: float) -> tuple[float, float]:
+    """Return the parameter p at a place of the unknowns, and dp/dT, at a period that is shorter by ``less``.
 
     Raises
     ------
     ConvergenceError
     """
-    (name, k), row = law, np.zeros(system.size)
-    at, of_period = system.parameter_index(name), system.parameter_index(PERIOD)
-    sizes = system.free_scales[[i - system.state_size for i in (at, of_period)]]
+    row, of_period = np.zeros(system.size), system.parameter_index(PERIOD)
+    p_size, size = system.free_scales[[i - system.state_size for i in (at, of_period)]]
     row[of_period] = 1.0
     tangent = linearization(system, x, row).tangent
-    guess = x - tangent / tangent[of_period] * less / sizes[1]
+    guess = x - tangent / tangent[of_period] * less / size
     found = correct(system, guess, row, guess[of_period]).x
     tangent = linearization(system, found, row).tangent
-    return float(sizes[0] * (found[at] + tangent[at] / tangent[of_period] / (k * sizes[1])))
+    return float(p_size * found[at]), float(p_size / size * tangent[at] / tangent[of_period])

@@ -61,3 +61,78 @@ def test_the_parameter_is_extrapolated(longest):
     found = branch.points[-1].details
     assert abs(found["limit_r"] - 13.926557407520) <= found["limit_r_error"] + 5e-13 < 1e-6
     assert "; as the period grows, r tends to 13.926557" in str(branch.stop)
+
+
+def _of_a_curve(ratio):
+    """Sandstede (1997): x^2 (1 - x) = y^2 is homoclinic at mu = 0 to the origin, with the eigenvalues 1 - ratio, -1 - ratio."""
+
+    def field(u, p):
+        a, turn = -ratio, p.mu * (2 - 3 * u.x)
+        return a * u.x + u.y - a * u.x**2 + turn * u.x, u.x + a * u.y - 1.5 * u.x**2 - 1.5 * a * u.x * u.y - 2 * p.mu * u.y
+
+    return field
+
+
+def _of_an_energy(potential, force, a):
+    """On H = 0, through the saddle, the orbit of mu = 0 is that without damping; eigenvalues 1 and -1."""
+    return lambda u, p: (u.y, force(u.x) + u.y * (p.mu - a * (u.y**2 / 2 + potential(u.x))))
+
+
+def _driven(friction):
+    return lambda u, p: (u.y, p.mu - friction * u.y - np.sin(u.x))
+
+
+def _beside(eigenvalue):
+    """One more state, of which the orbit has no part, with the eigenvalue nearest to the axis."""
+    plane = _of_a_curve(0.5)
+    return lambda u, p: (*plane(u, p), eigenvalue * u.z)
+
+
+def _morris_lecar(u, p):
+    current = 2 * (1 + np.tanh((u.x + 1.2) / 18)) * (u.x - 120) + 8 * u.y * (u.x + 84) + 2 * (u.x + 60)
+    return (p.mu - current) / 20, 0.2 * (0.5 * (1 + np.tanh((u.x - 12) / 17.4)) - u.y) * np.cosh((u.x - 12) / 34.8)
+
+
+def _yamada(u, p):
+    """Dubbeldam and Krauskopf (1999): the laser is off at a branch point, 6.8; the saddle of the orbit lies beside it."""
+    return 0.04 * (p.mu - u.x - u.x * u.z), 0.04 * (5.8 - u.y - 1.8 * u.y * u.z), (u.x - u.y - 1) * u.z
+
+
+#: Pairs of a potential and its force.
+WELL = (lambda x: x**3 / 3 - x**2 / 2, lambda x: x - x**2)
+WELLS = (lambda x: x**4 / 4 - x**2 / 2, lambda x: x - x**3)
+PENDULUM = (lambda x: -np.cos(x) - 1, lambda x: -np.sin(x))
+LONG = pytest.mark.full
+#: Field, start, first mu, limit, the longest periods, and those from which on the limit is known. Limits of driven pendulums are
+#: from the unstable manifold of the saddle, integrated (DOP853, 1e-13), that of the neuron from cycles five times as long.
+FAMILIES = [
+    pytest.param(_of_a_curve(0.5), [0.67, 0.1], 0.02, 0.0, (10, 15, 25, 60), 25, id="curve"),
+    pytest.param(_of_a_curve(0.9), [0.67, 0.1], 0.05, 0.0, (10, 25, 60), 60, id="curve, weak", marks=LONG),
+    pytest.param(_of_a_curve(0.99), [0.67, 0.1], 0.05, 0.0, (60, 300), 300, id="curve, near a fold", marks=LONG),
+    pytest.param(_beside(-0.1), [0.67, 0.1, 0.0], 0.02, 0.0, (15, 25, 60), 25, id="no part"),
+    pytest.param(_of_an_energy(*WELL, 0.5), [1.2, 0.1], -0.025, 0.0, (10, 25), 25, id="well"),
+    pytest.param(_of_an_energy(*WELLS, 2.0), [1.2, 1.1], 0.1, 0.0, (12, 25), 25, id="two wells", marks=LONG),
+    pytest.param(_of_an_energy(*WELLS, 2.0), [1.2, 0.1], -0.1, 0.0, (12, 15, 25), 15, id="one of two wells", marks=LONG),
+    pytest.param(_of_an_energy(*PENDULUM, 2.0), [0.0, 2.3], 0.2, 0.0, (8, 15, 25), 15, id="rotations", marks=LONG),
+    pytest.param(_driven(0.3), [0.0, 4.0], 1.3, 0.37347438584338, (12, 20, 40), 20, id="driven", marks=LONG),
+    pytest.param(_driven(1.15), [0.0, 1.0], 1.3, 0.99816726979542, (40, 80, 160, 300), 160, id="driven, near a fold"),
+    pytest.param(_driven(1.19), [0.0, 1.0], 1.3, 0.99999074748448, (160, 1000), 2000, id="driven, nearer", marks=LONG),
+    pytest.param(_driven(1.5), [0.0, 1.0], 1.3, 1.0, (20, 200, 2000), math.inf, id="fold", marks=LONG),
+    pytest.param(_morris_lecar, [0.0, 0.1], 45.0, 39.814496882499, (200, 300, 400, 700), 400, id="neuron", marks=LONG),
+    pytest.param(_yamada, [3.0, 2.0, 5.0], 7.2, 6.7999913, (500, 5000), math.inf, id="laser"),
+]
+
+
+@pytest.mark.parametrize(("field", "start", "mu", "limit", "longest", "known"), FAMILIES)
+def test_a_limit_lies_within_its_error_or_is_not_given(field, start, mu, limit, longest, known, request):
+    angles = ["x"] if request.node.callspec.id.startswith(("rotations", "driven", "fold")) else []
+    problem = CycleProblem(field, ["x", "y", "z"][: len(start)], {"mu": mu}, angles=angles)
+    first = contin.cycle(problem, start, settle=1000.0 if field is _yamada else 100.0)
+    for period in longest:
+        limits = {"mu": (-1, 60), "period": (0, period)}
+        branch = contin.trace(first, free=["mu"], direction=int(np.sign(limit - mu)), limits=limits)
+        assert str(branch.stop).startswith(f"reached period = {period}")
+        found = branch.points[-1].details or {}
+        assert ("limit_mu" in found) == (period >= known)
+        if found:
+            assert abs(found["limit_mu"] - limit) <= found["limit_mu_error"] <= 0.002
