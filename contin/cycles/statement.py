@@ -248,11 +248,11 @@ class CycleProblem(BoundaryValueProblem):
             return lambda *given: given[-2][place]
 
         means = {name: of_kept(function) for name, function in self.means.items()}
-        means |= {names[i]: of_kept(state(i)) for i in mass.found}
-        kept = [names[i] for i in mass.kept]
+        means |= {names[i]: of_kept(state(i)) for i in mass.columns}
+        kept = mass.kept_names(names)
         angles = {name: period for name, period in self.angles.items() if name in kept}
         rates = of_kept(mass.rates_of(self.field, arguments))
-        following = [names[i] for i in mass.found]
+        following = [names[i] for i in mass.columns]
         return FollowedProblem(rates, kept, parameters, means, following, period=self.period, angles=angles)
 
     def check_index(self, states: Array, parameters: Mapping[str, float]) -> None:

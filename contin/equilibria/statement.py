@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections import namedtuple
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, cast
 
@@ -24,6 +24,7 @@ from contin.functions.signature import Arguments, Signature, argument_count, res
 from contin.levels import LOCATED
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass
+from contin.problems.own_names import unused
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 from contin.problems.vector_field import combined, returning
 
@@ -60,7 +61,8 @@ class AlgebraicProblem(Restated):
         whole rounds are the same: a branch that comes back one round on is closed.
     mass : matrix, or sequence of float, optional
         The constant matrix M of M u' = F(u, p), or its diagonal. A state whose column is zero has no rate: it is a column,
-        found from the equations without rates, which must determine it (an index of one), from the value of the guess on.
+        found from the equations without rates, which must determine it (an index of one), from the value of the guess on. Where
+        columns depend on each other, combinations of states have rates: these are states such as ``mass_x``.
     solver : callable, optional
         ``solver(matrix)`` factors a square sparse matrix of SciPy (CSC) and returns an object with ``solve(b, trans)``: b of
         the shape (n,) or (n, k), trans "N" or "T" (transposed). It raises RuntimeError where the matrix is singular. By
@@ -272,11 +274,11 @@ class KeptProblem(AlgebraicProblem):
             return found
 
         functionals = {name: of_kept(function) for name, function in whole.functionals.items()}
-        functionals |= {names[i]: of_kept(_state(names[i])) for i in mass.found}
-        kept = [names[i] for i in mass.kept]
+        functionals |= {names[i]: of_kept(_state(names[i])) for i in mass.columns}
+        kept = mass.kept_names(names)
         angles = {name: period for name, period in whole.angles.items() if name in kept}
         rates = of_kept(mass.rates_of(whole.residual, 2))
-        self._keep(following=tuple(names[i] for i in mass.found))
+        self._keep(following=tuple(names[i] for i in mass.columns))
         super().__init__(rates, kept, whole.parameters, functionals, angles=angles)
 
 
@@ -311,7 +313,7 @@ class ReducedProblem(AlgebraicProblem):
         pivots = [int(row.argmax()) for row in own]
         kept = [i for i in range(len(names)) if i not in pivots]
         taken = {*names, *whole.parameters, *whole.functionals}
-        total_names = tuple(_unused(f"total_{names[i]}", taken) for i in pivots)
+        total_names = tuple(unused(f"total_{names[i]}", taken) for i in pivots)
         follow = np.zeros((len(names), len(names)))  # the states, of those that are kept and the totals
         follow[kept, np.arange(len(kept))] = 1.0
         follow[pivots, : len(kept)], follow[pivots, len(kept) :] = -totals[:, kept], np.eye(len(totals))
@@ -369,13 +371,6 @@ class ReducedProblem(AlgebraicProblem):
         if len(self.totals) == 1:
             return f"{texts} is conserved: the parameter {names} is its value, and {states} follows from the other states"
         return f"{texts} are conserved: the parameters {names} are their values, and {states} follow from the other states"
-
-
-def _unused(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken."""
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _state(name: str) -> Function:

@@ -1,9 +1,10 @@
 """Mass matrices: M u' = F with a constant M becomes u' = f.
 
-A regular M is inverted. A singular one has columns of zeros, those of states z that are found from equations without rates.
-With L1 M = 1 for the other states y, and rows L2 that span what M maps nothing to,
+A regular M is inverted. Of a singular one, the columns of the states z depend on those of other states k:
+M = M_k [1 E] for u = (k, z). The rates of y = k + E z are known, those of z are not. E = 0 where columns are zero.
+With L1 M_k = 1, and rows L2 that span what M maps nothing to,
 
-    y' = L1 F(y, z),        0 = L2 F(y, z),
+    y' = L1 F(y - E z, z),        0 = L2 F(y - E z, z),
 
 where z is found for given y by Newton's method, as an operation of the tape (`contin.functions.iteration`). That takes an index
 of one: the derivative of L2 F by z is regular.
@@ -23,6 +24,7 @@ from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.iteration import MOST, root
 from contin.levels import CORRECTED
+from contin.problems.own_names import unused
 from contin.problems.vector_field import combined
 
 
@@ -34,7 +36,9 @@ class Mass:
     ----------
     matrix : ndarray, shape (n, n)
     kept, found : list of int
-        Places of the states with rates, y, and of those that are found, z.
+        Places of the states k and z.
+    others : list of list of float
+        E, a row for each of k.
     rates, algebraic : list of list of float
         Rows L1 and L2.
     """
@@ -42,6 +46,7 @@ class Mass:
     matrix: Array
     kept: list[int]
     found: list[int]
+    others: list[list[float]]
     rates: list[list[float]]
     algebraic: list[list[float]]
 
@@ -52,7 +57,7 @@ class Mass:
         Raises
         ------
         ProblemError
-            It is neither, or has a column that is not zero and depends on the others.
+            It is neither, or too many states have no rates.
         """
         n = len(names)
         given = mass.toarray() if hasattr(mass, "toarray") else mass
@@ -62,26 +67,37 @@ class Mass:
             diagonal = False
         matrix = checks.array("mass", given, (n,) if diagonal else (n, n))
         matrix = np.diag(matrix) if diagonal else matrix
-        kept = [int(i) for i in np.flatnonzero(matrix.any(axis=0))]
+        kept = _independent(matrix)
         found = [i for i in range(n) if i not in kept]
         if not kept:
             raise ProblemError("mass: it is zero; leave it out and state dynamics=False")
         left, sizes, right = np.linalg.svd(matrix[:, kept])
-        if sizes[-1] <= CORRECTED * sizes[0]:
-            states = checks.listed(names[i] for i in kept)
-            raise ProblemError(f"mass: its columns of {states} depend on each other; take states of which some have no rates")
         if len(found) > MOST:
             raise ProblemError(f"mass: {len(found)} states have no rates, at most {MOST} can be found")
         rates = right.T @ (left[:, : len(kept)] / sizes).T
+        others = _cleaned(rates @ matrix)[:, found] if matrix[:, found].any() else np.zeros((len(kept), len(found)))
         zero_rows = np.flatnonzero(~matrix.any(axis=1))
         algebraic = np.eye(n)[zero_rows] if len(zero_rows) == len(found) else left[:, len(kept) :].T
-        exact = np.where(np.abs(rates) > CORRECTED * np.abs(rates).max(axis=1, keepdims=True), rates, 0.0)
-        return cls(matrix, kept, found, exact.tolist(), algebraic.tolist())
+        return cls(matrix, kept, found, others.tolist(), _cleaned(rates).tolist(), algebraic.tolist())
 
     @property
     def is_regular(self) -> bool:
         """All states have rates."""
         return not self.found
+
+    def kept_names(self, names: Sequence[str]) -> list[str]:
+        """Return the names of y: those of k or, where E is not zero, such as ``mass_x``."""
+        return [unused(f"mass_{names[i]}", names) if any(row) else names[i] for i, row in zip(self.kept, self.others)]
+
+    @property
+    def columns(self) -> list[int]:
+        """Places of the states that follow from y: z, and those of k that y is not."""
+        return sorted([*self.found, *(i for i, row in zip(self.kept, self.others) if any(row))])
+
+    def of_states(self, states: Array) -> Array:
+        """Return y of states (..., n)."""
+        found: Array = states[..., self.kept] + states[..., self.found] @ np.reshape(self.others, (len(self.kept), -1)).T
+        return found
 
     def rates_of(self, field: Function, arguments: int) -> Function:
         """Return the rates of the states that have some, as a function of ``arguments`` arguments: (u, p) or (t, u, p)."""
@@ -103,13 +119,16 @@ class Mass:
     ) -> Function:
         """Return a function of all states as one of y: z is found from a start such that L2 F = 0, with the field F."""
         state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
-        kept, found, algebraic, starts = self.kept, self.found, self.algebraic, [float(value) for value in start]
+        kept, found, others, algebraic = self.kept, self.found, self.others, self.algebraic
+        starts = [float(value) for value in start]
 
         def of_kept(*given: Any) -> Any:
             *times, u, p = given
 
             def whole(z: Sequence[Any]) -> Any:
-                known = {**dict(zip(kept, u)), **dict(zip(found, z))}
+                known = dict(zip(found, z))
+                for i, value, row in zip(kept, u, others):
+                    known[i] = value - combined([row], z)[0] if any(row) else value
                 return state(*(known[i] for i in range(len(names))))
 
             z = root(lambda w: combined(algebraic, field(*times, whole(w), p)), starts)
@@ -125,7 +144,8 @@ class Mass:
         ProblemError
             The derivative of L2 F by z is singular.
         """
-        by_found = np.array(self.algebraic) @ jacobian[:, self.found]
+        by_found = jacobian[:, self.found] - jacobian[:, self.kept] @ np.reshape(self.others, (len(self.kept), -1))
+        by_found = np.array(self.algebraic) @ by_found
         if not np.isfinite(by_found).all():
             return
         sizes = np.abs(by_found).max(axis=1, keepdims=True)
@@ -137,6 +157,28 @@ class Mass:
                 f"mass: the equations without rates do not determine {states} at the guess, as their derivatives by these are "
                 "singular: the index is larger than one; differentiate them by the time until they do, or take another guess"
             )
+
+
+def _independent(matrix: Array) -> list[int]:
+    """Return the first columns on which all others depend, whatever their units are."""
+    sizes = np.abs(matrix).max(axis=0)
+    kept = [int(i) for i in np.flatnonzero(sizes)]
+
+    def rank(columns: list[int]) -> int:
+        return int(np.linalg.matrix_rank(matrix[:, columns] / sizes[columns], rtol=CORRECTED))
+
+    if not kept or rank(kept) == len(kept):
+        return kept
+    found: list[int] = []
+    for i in kept:
+        found += [i] if rank([*found, i]) > len(found) else []
+    return found
+
+
+def _cleaned(matrix: Array) -> Array:
+    """Return a matrix without round-off in the place of zeros."""
+    cleaned: Array = np.where(np.abs(matrix) > CORRECTED * np.abs(matrix).max(axis=1, keepdims=True), matrix, 0.0)
+    return cleaned
 
 
 def _of(function: Callable[..., Any], count: int) -> Function:

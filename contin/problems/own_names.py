@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from contin import checks
 from contin.errors import ProblemError
@@ -30,3 +30,10 @@ def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
     if not (rounds >= 1 and rounds == int(rounds)):
         raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
     return int(rounds)
+
+
+def unused(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken."""
+    while name in taken:
+        name += "_"
+    return name

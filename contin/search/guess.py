@@ -73,10 +73,10 @@ def _with_rates(problem: Any, guess: Guess, parameters: dict[str, float]) -> tup
     mass, names = problem.mass, problem.state_names
     if mass is None:
         return problem, guess, parameters
-    if isinstance(guess, Point) and not {*guess.system.problem.states} - {names[i] for i in mass.kept}:
+    if isinstance(guess, Point) and not {*guess.system.problem.states} - {*mass.kept_names(names)}:
         known = underlying(guess)
         return problem.without_found([known[names[i]] for i in mass.found]), guess, parameters
-    guess, first = _taken(problem, guess, lambda states: (states[..., mass.kept], states.reshape(-1, len(names))[0]))
+    guess, first = _taken(problem, guess, lambda states: (mass.of_states(states), states.reshape(-1, len(names))[0]))
     first = np.zeros(len(names)) if first is None else first
     problem.check_index(first, {**problem.parameters, **parameters})
     found = problem.without_found(first[mass.found])

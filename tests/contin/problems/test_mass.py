@@ -110,8 +110,28 @@ def test_rows_of_rates_that_are_mixed():
     point = contin.solve(problem, [0.5, 0.2])
     assert point["x"] == pytest.approx(1.0, abs=1e-12) and point["z"] == pytest.approx(1.0, abs=1e-12)
     assert point.system.eigenvalues(point.x) == pytest.approx([-3.0], abs=1e-12)
-    with pytest.raises(ProblemError, match="mass: its columns of x, z depend on each other"):
-        AlgebraicProblem(field, ["x", "z"], {"a": 2.0}, mass=[[1, 1], [1, 1]])
+    sums = contin.solve(AlgebraicProblem(field, ["x", "z"], {"a": 2.0}, mass=[[1, 1], [1, 1]]), [0.5, 0.2])
+    assert [sums["mass_x"], sums["x"], sums["z"]] == pytest.approx([2, 1, 1], abs=1e-12)
+    assert sums.system.eigenvalues(sums.x) == pytest.approx([-1.0], abs=1e-12)  # (x + z)' = a - (x + z)
+
+
+def test_a_capacitor_between_two_nodes(tmp_path):
+    """C (v1 - v2)' is what flows between two nodes, one grounded by a resistor: with w = v1 - v2, an inductor and a
+    conductance, w'' - (k - 1/10 - 3 w^2) w' + w = 0. A Hopf point at k = 1/10 with the frequency 1, then
+    w^2 = 4 (k - 1/10) / 3 at most."""
+
+    def nodes(u, p):
+        flow = -u.i + (p.k - 0.1) * (u.v1 - u.v2) - (u.v1 - u.v2) ** 3
+        return flow, -flow - u.v2, u.v1 - u.v2
+
+    tank = AlgebraicProblem(nodes, ["v1", "v2", "i"], {"k": 0.0}, mass=[[1, -1, 0], [-1, 1, 0], [0, 0, 1]])
+    branch = contin.trace(contin.solve(tank, [0, 0, 0]), free=["k"], limits={"k": (0, 1)})
+    (hopf,) = branch.labelled("HB")
+    assert hopf["k"] == pytest.approx(0.1, abs=1e-12) and hopf.details["frequency"] == pytest.approx(1, abs=1e-9)
+    cycles = contin.trace(hopf, branch=1, limits={"k": (0, 0.11)})
+    assert cycles[-1]["max_v1"] == pytest.approx(math.sqrt(4 / 3 * 0.01), rel=1e-3)
+    contin.save(branch, tmp_path / "branch.npz")
+    assert contin.load(tank, tmp_path / "branch.npz")[-1]["v1"] == branch[-1]["v1"]
 
 
 def test_with_a_conserved_total():
