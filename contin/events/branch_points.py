@@ -111,7 +111,7 @@ class BranchPointSearch:
         matrix = functools.cache(lambda part: self._bordered(part, rows, column))
         first, last = matrix(0.0), matrix(1.0)
         g = [factors.solve(unit)[-1] for factors in (first, last)]
-        changes = bool(g[0] * g[1] < 0)
+        changes = sign_changed(g[0], g[1])
         if not np.isfinite(g).all() or (self._says_sign and changes != self._sign_changes):
             return None
         values = quotients_along(matrix)
@@ -124,11 +124,11 @@ class BranchPointSearch:
         if changes:
             self._shares = _shares(np.array([g[0] / g[1]]))
             return 1, True
-        if matrix(0.5).solve(unit)[-1] * g[0] > 0:
+        if np.sign(matrix(0.5).solve(unit)[-1]) == np.sign(g[0]):
             return 0, True
         with contextlib.suppress(ConvergenceError):  # the cubic may lie on the other side of a zero
             middle = system.linearize(arc.at(arc.step / 2).x, rows, column)[1]
-            if middle.solve(unit)[-1] * g[0] > 0:
+            if np.sign(middle.solve(unit)[-1]) == np.sign(g[0]):
                 return 0, True
         return None
 
@@ -234,5 +234,5 @@ class BranchPointSearch:
 def _shares(values: ComplexArray) -> Array:
     """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
     sizes = np.abs(values)
-    shares: Array = sizes / (1 + sizes)
+    shares: Array = 1 - 1 / (1 + sizes)  # an infinite one, too
     return shares
