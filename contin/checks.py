@@ -83,8 +83,7 @@ def function(what: str, value: object) -> Callable[..., Any]:
     """Require something that can be called, and return it."""
     if not callable(value):
         raise ProblemError(f"{what}: {shown(value)} must be a function")
-    found: Callable[..., Any] = value
-    return found
+    return value
 
 
 def mapping(what: str, value: object, holds: str) -> Mapping[str, Any]:

@@ -28,11 +28,9 @@ def generator(word: str) -> np.random.Generator:
 
 def signs(random: np.random.Generator, like: Array) -> Array:
     """Return random signs, of the shape of an array."""
-    found: Array = np.copysign(1.0, random.random(like.shape) - 0.5)
-    return found
+    return np.copysign(1.0, random.random(like.shape) - 0.5)
 
 
 def rounded(random: np.random.Generator, x: Array) -> Array:
     """Return numbers moved up or down by one unit in the last place."""
-    moved: Array = x * (1 + np.finfo(float).eps * signs(random, x))
-    return moved
+    return x * (1 + np.finfo(float).eps * signs(random, x))

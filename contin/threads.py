@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import os
 import threading
 from collections.abc import Callable, Sequence
@@ -42,50 +41,15 @@ def each(function: Callable[[_Job], _Result], jobs: Sequence[_Job]) -> list[_Res
 
     If calls raise exceptions, that of the first of these jobs is raised, as in a loop.
     """
-    threads = min(count(), len(jobs))
-    if threads < 2:
+    if min(count(), len(jobs)) < 2:
         return [function(job) for job in jobs]
-    work = _Work(function, jobs)
     with _LOCK:
-        others = [_pool(count() - 1).submit(work.run) for _ in range(threads - 1)]
+        futures = [_pool(count()).submit(function, job) for job in jobs]
     try:
-        work.run()
-        for other in others:
-            if not other.cancel():  # all jobs are taken: a thread that has not begun has nothing to do
-                other.result()
+        return [future.result() for future in futures]
     finally:
-        work.stop()
-    return work.results()
-
-
-class _Work:
-    """Jobs that threads take one by one, and what came of them."""
-
-    def __init__(self, function: Callable[[Any], Any], jobs: Sequence[Any]) -> None:
-        self._function, self._jobs = function, jobs
-        self._next = itertools.count()
-        self._found: list[Any] = [None] * len(jobs)
-        self._failed: dict[int, Exception] = {}
-        self._stopped = False
-
-    def run(self) -> None:
-        """Do jobs until there are no more, or one fails."""
-        while not self._stopped and (i := next(self._next)) < len(self._jobs):
-            try:
-                self._found[i] = self._function(self._jobs[i])
-            except Exception as error:
-                self._failed[i] = error
-                self.stop()
-
-    def stop(self) -> None:
-        """Take no more jobs."""
-        self._stopped = True
-
-    def results(self) -> list[Any]:
-        """Return the results, or raise the exception of the first job that failed: all jobs before it were taken."""
-        if self._failed:
-            raise self._failed[min(self._failed)]
-        return self._found
+        for future in futures:  # of those behind one that failed, none begins
+            future.cancel()
 
 
 #: Pools of threads by their size. They live until the process ends or forks.

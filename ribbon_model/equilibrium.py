@@ -146,5 +146,4 @@ def moment_of(q, lam) -> list:
 
 def moment_on_axes(q, lam) -> np.ndarray:
     """Return the moment on the lab axes from the multipliers of the quaternion."""
-    result: np.ndarray = moment_on_directors(q, lam) @ np.array(directors(*q)).reshape(3, 3)
-    return result
+    return moment_on_directors(q, lam) @ np.array(directors(*q)).reshape(3, 3)

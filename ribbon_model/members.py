@@ -105,8 +105,7 @@ def frame_along(tangent: Sequence[float], normal: Vector, what: str) -> Quaterni
     if np.linalg.norm(across) < LOOSE:
         raise ValueError(f"normal: {list(normal)} lies along {what}")
     across /= np.linalg.norm(across)
-    frame: Quaternion = numbers_of(quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0])
-    return frame
+    return numbers_of(quaternions(np.array([[np.cross(across, tangent), across, tangent]]))[0])
 
 
 def numbers_of(values: object) -> Any:

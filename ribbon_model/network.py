@@ -866,13 +866,11 @@ class Network:
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:
         """Return quaternion, place, and their multipliers (14,) at an end."""
         number = list(self.members).index(each.member)
-        row: np.ndarray = point.system.states(point.x)[0 if each.end == START else -1, self.places[number]]
-        return row
+        return point.system.states(point.x)[0 if each.end == START else -1, self.places[number]]
 
     def _arm(self, point: Point, each: JointEnd, arm: Vector) -> np.ndarray:
         """Return an arm on the axes of the drawing, fixed on an end, as it has turned."""
-        turned: np.ndarray = (self.drawn_axes(each) @ np.array(arm, dtype=float)) @ _axes(self._state(point, each))
-        return turned
+        return (self.drawn_axes(each) @ np.array(arm, dtype=float)) @ _axes(self._state(point, each))
 
     def potential(self, point: Point) -> float:
         """Return the energy with the potential of all loads: that of which the index is."""

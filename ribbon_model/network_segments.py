@@ -245,13 +245,11 @@ class NetworkChain:
     def _frame_of_end(self, end: _End) -> np.ndarray:
         """Return the directors of an end; columns."""
         piece = self.pieces[end.piece]
-        frame: np.ndarray = piece.axes[-1] if end.last else piece.first
-        return frame
+        return piece.axes[-1] if end.last else piece.first
 
     def _place(self, end: _End) -> np.ndarray:
         piece = self.pieces[end.piece]
-        place: np.ndarray = piece.place + end.arm + (piece.centreline[-1] if end.last else 0.0)
-        return place
+        return piece.place + end.arm + (piece.centreline[-1] if end.last else 0.0)
 
     def _joint_frame(self, each: JointEnd) -> np.ndarray:
         """Return the rotation (3, 3) of an end from the drawing, before which it is turned by its angle."""
@@ -431,8 +429,7 @@ def _numbers(network: Network, section: str, numbers: Mapping[str, float]) -> Si
 
 
 def _vector(rotation: np.ndarray) -> np.ndarray:
-    vector: np.ndarray = Rotation.from_matrix(rotation).as_rotvec()
-    return vector
+    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def _turned(frame: np.ndarray, now: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, float]:

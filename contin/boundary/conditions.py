@@ -67,8 +67,7 @@ class Conditioned(Collocation):
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
         own = self.conditions_with_rows(x)[1]
-        product: Array = super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
-        return product
+        return super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several directions, shape (equations,)."""

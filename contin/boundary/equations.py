@@ -269,8 +269,7 @@ class BoundaryEquations(OnMesh):
         """Return the values of the problem's functionals, in their order, by the same quadrature."""
         if not self.problem.functionals:
             return np.empty(0)
-        integrals: Array = self.gauss_weights @ self.problem.batch("functionals").values(*self._inside_unscaled(x))
-        return integrals
+        return self.gauss_weights @ self.problem.batch("functionals").values(*self._inside_unscaled(x))
 
     def integrands(self, x: Array, times: Array, points: Array) -> Array:
         """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""

@@ -182,14 +182,12 @@ class Fields(Spectral, Collocation):
         at = self.gauss_times, np.hstack([states, np.zeros_like(states)]), np.empty((0, 2 * n)), self.all_parameters(x)
         found = batch.jacobian(*at, batch.columns((), range(n, 2 * n)))[1]
         sizes = self.scales.states
-        scaled: Array = found * sizes / sizes[self.problem.rate_rows][:, None]
-        return scaled
+        return found * sizes / sizes[self.problem.rate_rows][:, None]
 
     @property
     def moving_states(self) -> Array:
         """1 for the states whose rates occur, else 0, shape (n,)."""
-        found: Array = self.problem.batch("rates").depends[:, self._n : 2 * self._n].any(axis=0).astype(float)
-        return found
+        return self.problem.batch("rates").depends[:, self._n : 2 * self._n].any(axis=0).astype(float)
 
     def rates_gradient(self, x: Array, w: Array, v: Array) -> Array:
         """Return the derivatives of w.B v by x, shape (size,), for w (equations,) and v (size,)."""
@@ -212,8 +210,7 @@ class Fields(Spectral, Collocation):
 
         def values(w: Array) -> Array:
             at = self.gauss_times, np.hstack([states, w * sizes]), np.empty((0, 2 * self._n)), self.all_parameters(x)
-            found: Array = batch.values(*at) / sizes[self.problem.rate_rows]
-            return found
+            return batch.values(*at) / sizes[self.problem.rate_rows]
 
         there, rest = values(rates), values(0 * rates)
         linear = np.einsum("qrb,qb->qr", self._rates(x), rates)

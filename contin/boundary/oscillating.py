@@ -149,12 +149,10 @@ def _differentiation(times: int) -> Array:
     apart = np.subtract.outer(np.arange(times), np.arange(times))
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (-1.0) ** apart / (2 * np.sin(np.pi * apart / times))
-    matrix: Array = np.where(apart == 0, 0.0, found)
-    return matrix
+    return np.where(apart == 0, 0.0, found)
 
 
 def turned(vector: ComplexArray, times: int) -> Array:
     """Return Re(v exp(2 pi i j / M)) for j = 0 ... M - 1, side by side: shape (K, M n) for v of shape (K, n)."""
     wave = np.exp(2j * np.pi * np.arange(times) / times)
-    found: Array = (vector[:, None, :] * wave[:, None]).real.reshape(len(vector), -1)
-    return found
+    return (vector[:, None, :] * wave[:, None]).real.reshape(len(vector), -1)

@@ -85,8 +85,7 @@ class SecondVariation:
         if len(modes):
             modes = canonical_basis(modes.reshape(len(modes), -1)).reshape(modes.shape)
         largest = np.abs(modes).max(axis=(1, 2), keepdims=True, initial=0.0)
-        result: Array = modes / np.where(largest > 0, largest, 1.0)
-        return result
+        return modes / np.where(largest > 0, largest, 1.0)
 
     def _at(self, unknowns: Array, t: Array) -> Array:
         """Return dx at t (K,), shape (K, n), from the reduced unknowns."""
@@ -255,8 +254,7 @@ class _Profile(NamedTuple):
         weights = 1 / np.prod(nodes[:, None] - nodes + np.eye(len(nodes)), axis=1)
         e = np.clip(np.searchsorted(self.mesh, t, side="right") - 1, 0, count - 1)
         matrix = interpolation(nodes, weights, (t - self.mesh[e]) / np.diff(self.mesh)[e])
-        result: Array = np.einsum("ij,ijk->ik", matrix, np.concatenate([x[:, None], at_points], axis=1)[e])
-        return result
+        return np.einsum("ij,ijk->ik", matrix, np.concatenate([x[:, None], at_points], axis=1)[e])
 
 
 class _Part(NamedTuple):
@@ -341,8 +339,7 @@ def _products(weights: Array, a: Array, b: Array) -> Array:
     """Return the integrals of a^T b over each interval, (N, j, l), from values at Gauss points: (N, d, k, j), (N, d, k, l)."""
     rows = a.shape[1] * a.shape[2]
     weighted = (weights[:, :, None, None] * a).reshape(len(a), rows, -1)
-    result: Array = weighted.swapaxes(1, 2) @ b.reshape(len(b), rows, -1)
-    return result
+    return weighted.swapaxes(1, 2) @ b.reshape(len(b), rows, -1)
 
 
 def _jacobians(system: Collocation, x: Array) -> list[tuple[Indices, Array]]:

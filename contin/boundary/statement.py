@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
@@ -21,7 +20,7 @@ from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature, argument_count, result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
@@ -302,7 +301,7 @@ def _value_count(name: str, function: Function | None, signature: Signature, giv
 
 def _of_both(function: Function, names: Sequence[str]) -> Function:
     """Return a function of t, states, rates and parameters as one of t, states with the rates behind them, and parameters."""
-    states: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
+    states = named_values(tuple(names))
 
     def of_both(t: Any, both: Any, p: Any) -> Any:
         values = list(both)

@@ -153,26 +153,21 @@ class Collocation(BoundaryEquations):
 
     def events(self) -> list[Event]:
         """Return those of the statement."""
-        found: list[Event] = self.problem.events()
-        return found
+        return self.problem.events()
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the statement says."""
-        found: Stability = self.problem.stability(point)
-        return found
+        return self.problem.stability(point)
 
     def degenerate(self, x: Array) -> str:
         """Return what the statement says."""
-        found: str = self.problem.degenerate(self, x)
-        return found
+        return self.problem.degenerate(self, x)
 
     def undetermined(self, x: Array) -> str:
         """Return what the statement says."""
-        found: str = self.problem.undetermined(self, x)
-        return found
+        return self.problem.undetermined(self, x)
 
     @property
     def index(self) -> Event | None:
         """That of the statement."""
-        found: Event | None = self.problem.index
-        return found
+        return self.problem.index

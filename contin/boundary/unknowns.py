@@ -121,8 +121,7 @@ class OnMesh(System):
         """Return the states divided by their sizes at ``places`` (K,) of an interval, between 0 and 1, shape (K, n)."""
         first = interval * self._d
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, places)
-        states: Array = matrix @ self._scaled_states(x)[first : first + self._d + 1]
-        return states
+        return matrix @ self._scaled_states(x)[first : first + self._d + 1]
 
     def phase_row(self, reference: Array) -> Array:
         """Return the row of the integral of u . v' over that of v' . v', shape (size,), for scaled states v at the nodes.

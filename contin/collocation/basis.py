@@ -95,5 +95,4 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     exact = distance == 0
     terms = barycentric / np.where(exact, 1.0, distance)
     matrix = terms / terms.sum(axis=1, keepdims=True)
-    result: Array = np.where(exact.any(axis=1, keepdims=True), exact, matrix)
-    return result
+    return np.where(exact.any(axis=1, keepdims=True), exact, matrix)

@@ -95,8 +95,7 @@ def _switches(recorded: Recorded, batch: Batch, free: Sequence[int] | Indices) -
         timely, moving = switches(recording.tape, recording.results, recording.time, recording.inputs[:states], moved)
         of_time = _sides(recorded, timely) if 0 < len(timely) <= MOST_SWITCHES else None
         recorded.kept[key] = of_time, _selections(recorded, batch, moving) if moving else None
-    found: tuple[_Values | None, Selections | None] = recorded.kept[key]
-    return found
+    return recorded.kept[key]
 
 
 def _selections(recorded: Recorded, batch: Batch, found: dict[Switch, Gaps]) -> Selections:

@@ -223,8 +223,7 @@ class Defect:
             values = np.abs(system.integrands(np.ones(system.size), system.mesh, ones))
         values[~np.isfinite(values)] = 0.0
         found = self.h @ (values[1:] + values[:-1]) / 2
-        sizes: Array = np.where(found > 0, found, 1.0)
-        return sizes
+        return np.where(found > 0, found, 1.0)
 
 
 @kernel(reorder=False)

@@ -94,8 +94,7 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
-    result: Array = both.max(axis=0) ** (1 / (d + 1))
-    return result
+    return both.max(axis=0) ** (1 / (d + 1))
 
 
 def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
@@ -103,8 +102,7 @@ def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
     inside = near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
     beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
     largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
-    found: Array = np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
-    return found
+    return np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
 
 
 def near(places: Array, breaks: Array, length: float) -> Array:
@@ -175,8 +173,7 @@ def _raised(phi: Array, h: Array) -> Array:
     """Return the density, smoothed and not far below its mean."""
     padded = np.concatenate([phi[:1], phi, phi[-1:]])
     phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
-    raised: Array = np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
-    return raised
+    return np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
 
 
 def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _NOWHERE) -> Array:

@@ -89,8 +89,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
 
     def worst(places: Array, ends: Array, which: Indices) -> Array:
         """Return the largest gap of each switch between its place and an end, shape (K,)."""
-        found: Array = largest(places[:, None] + (ends - places)[:, None] * _PARTS, places, which).max(axis=1)
-        return found
+        return largest(places[:, None] + (ends - places)[:, None] * _PARTS, places, which).max(axis=1)
 
     with np.errstate(all="ignore"):
         a, b, which = brackets(*_sampled(system, selections, x, p))

@@ -201,8 +201,7 @@ class ConnectionEquations(Conditioned):
             if len(self._known) > KEPT:
                 self._known.clear()
             self._known[key] = make()
-        found: _Result = self._known[key]
-        return found
+        return self._known[key]
 
     @functools.cached_property
     def _known(self) -> dict[tuple[str, bytes], Any]:
@@ -291,8 +290,7 @@ class ConnectionEquations(Conditioned):
 
     def _unit_directions(self, places: Indices) -> Array:
         """Return directions of all parameters, one for each of some of them, shape (m, number of names)."""
-        units: Array = np.eye(len(self.parameters))[places]
-        return units
+        return np.eye(len(self.parameters))[places]
 
     def _end_places(self, subspaces: list[dict[Numbers, Array]]) -> list[tuple[slice, int, dict[Numbers, Array]]]:
         """Return of both ends the rows of the projection conditions, the place of the states in x, and L with derivatives."""
@@ -350,8 +348,7 @@ class ConnectionEquations(Conditioned):
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of these conditions by any parameters."""
         by_parameters = self._conditions_at_ends(x, names)[2]
-        found: Array = by_parameters * self.scales.parameters[self._indices(names)]
-        return found
+        return by_parameters * self.scales.parameters[self._indices(names)]
 
     # --- in one call of a kernel -----------------------------------------------------------------------------------
 
@@ -449,8 +446,7 @@ class ConnectionEquations(Conditioned):
             amounts += [*(np.abs(H @ np.kron(z, z)) + float(np.linalg.norm(apart)) ** 3 / size**2)]
         right_sides = np.zeros((len(amounts), self.equations + 1))
         right_sides[range(len(amounts)), range(self._conditions, self._conditions + len(amounts))] = amounts
-        solved: Array = factors.solve(right_sides)
-        return solved
+        return factors.solve(right_sides)
 
     def _bent_jacobian(self, p: Array, direction: Array, end: int) -> Array:
         """Return the derivative of the Jacobian at an equilibrium along a direction of the states, both scaled."""
@@ -575,8 +571,7 @@ def _sylvester(a: Array, b: Array) -> Callable[[Array], Array]:
 
     def solve(right: Array) -> Array:
         found, scale, _ = dtrsyl(r, s, u.T @ right @ v, tranb="C")
-        result: Array = u @ (scale * found) @ v.T
-        return result
+        return u @ (scale * found) @ v.T
 
     return solve
 
@@ -598,5 +593,4 @@ def _normalized(left: Array, basis: Array) -> Array:
 def _orthonormal(left: Array) -> Array:
     """Return the orthonormal basis of the same space that is closest to a basis."""
     u, _, v = np.linalg.svd(left, full_matrices=False)
-    found: Array = u @ v
-    return found
+    return u @ v

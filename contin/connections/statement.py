@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from contin.connections.system import ConnectionCollocation
 from contin.core.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature
+from contin.functions.signature import Arguments, Signature, named_values
 from contin.problems.angles import Angles, angle_periods, check_periodic, winding_names
 from contin.problems.own_names import TIME
 from contin.problems.statement import check_statement
@@ -164,7 +163,7 @@ class ConnectionProblem(BoundaryValueProblem):
 
 def _at_rest(field: Function, names: Sequence[str], homoclinic: bool) -> Function:
     """Return the boundary conditions: the field vanishes at the equilibria."""
-    state: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
+    state = named_values(tuple(names))
     kinds = ("from_",) if homoclinic else ("from_", "to_")
 
     def boundary(a: Named, b: Named, p: Named) -> Any:

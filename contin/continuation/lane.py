@@ -420,8 +420,7 @@ class Block:
 
     def _free(self, x: Array) -> Array:
         """Return the free parameters in the user's units."""
-        found: Array = x[..., self._system.state_size :] * self._system.free_scales
-        return found
+        return x[..., self._system.state_size :] * self._system.free_scales
 
     def points(self) -> Iterator[tuple[Any, Point]]:
         """Yield what returns the state behind each step, and the point there."""

@@ -216,8 +216,7 @@ class _FirstPoint:
             x, factors, longer = self._beside(number)
             rounded = {id(direction): self._rounded(longer * direction) for direction in directions}
             right = self.system.along(x, [rounded[id(direction)] for direction in directions])
-            found: Array = factors.solve(self._rounded(np.append(right, 0.0))) / longer ** len(directions)
-            return found
+            return factors.solve(self._rounded(np.append(right, 0.0))) / longer ** len(directions)
 
         with np.errstate(all="ignore"):
             found = self._factors.solve(np.append(self.system.along(self.x, directions), 0.0))
@@ -413,15 +412,13 @@ class _FirstPoint:
 
     def _rounded(self, v: Array) -> Array:
         """Return a vector changed by one unit in the last place, up or down."""
-        found: Array = draws.rounded(self._random, v)
-        return found
+        return draws.rounded(self._random, v)
 
     def _kept(self, v: Array, kept: Pattern) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""
         count = len(self.system.problem.states)
         kept_states = np.tile(kept[:count], self.system.state_size // count)
-        result: Array = v * np.concatenate([kept_states, kept[count:]])
-        return result
+        return v * np.concatenate([kept_states, kept[count:]])
 
 
 def _has_settled(numbers: Sequence[float]) -> bool:
@@ -463,8 +460,7 @@ def _bent(terms: Sequence[Array], known: Array) -> float:
 
 def _sizes(terms: Sequence[Array], change: float) -> Array:
     """Return the largest term of an expansion, by state, at a change of its variable."""
-    found: Array = np.max([term * change**power for power, term in enumerate(terms, 1)], axis=0)
-    return found
+    return np.max([term * change**power for power, term in enumerate(terms, 1)], axis=0)
 
 
 def _balanced(terms: Sequence[Array], sizes: Array) -> float:
@@ -477,14 +473,12 @@ def _balanced(terms: Sequence[Array], sizes: Array) -> float:
 
 def _larger(sizes: Array, others: Array, where: Pattern, error: Array) -> Array:
     """Return sizes, the larger ones of both in some places, where they are more than errors."""
-    found: Array = np.where(where & (others > error), np.maximum(sizes, others), sizes)
-    return found
+    return np.where(where & (others > error), np.maximum(sizes, others), sizes)
 
 
 def _counts(values: Array, natural: Array) -> Pattern:
     """Return which values are more than nothing, compared with the sizes that the expansion gives."""
-    found: Pattern = (values >= USUAL[0]) | (values > DOUBLED * natural)
-    return found
+    return (values >= USUAL[0]) | (values > DOUBLED * natural)
 
 
 def _said(name: str, settings: Settings) -> float:

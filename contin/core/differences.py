@@ -92,5 +92,4 @@ def _differences(function: Callable[[float], Any], middle: Array, order: int, h:
         ahead, behind = (np.asarray(function(s * (k + 1) * h), dtype=float) for s in (1, -1))
         side = ahead - behind if order % 2 else ahead + behind - 2 * middle
         total += np.multiply.outer(weights[:, k], side)
-    result: Array = total / h**order
-    return result
+    return total / h**order

@@ -56,8 +56,7 @@ def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Arr
         along = units[0] + sum(sign * unit for sign, unit in zip(signs, units[1:]))
         if np.any(along):
             total = total + np.prod(signs) * form(along)
-    result: Array = total * np.prod(sizes) / (2 ** (count - 1) * np.prod(np.arange(1, count + 1)))
-    return result
+    return total * np.prod(sizes) / (2 ** (count - 1) * np.prod(np.arange(1, count + 1)))
 
 
 def subsets(count: int) -> list[Numbers]:

@@ -142,8 +142,7 @@ class Discretization(Equations, Protocol):
         """
 
         def bend(v: Array) -> Array:
-            found: Array = derivative(lambda s: self.residual(x + s * v), len(directions), 1 / np.abs(v).max())[0]
-            return found
+            return derivative(lambda s: self.residual(x + s * v), len(directions), 1 / np.abs(v).max())[0]
 
         return of_lines(bend, directions)
 
@@ -152,8 +151,7 @@ class Discretization(Equations, Protocol):
 
         Kinds of system that do not say are made of unknowns of order one.
         """
-        found: Array = 1 + np.abs(x)
-        return found
+        return 1 + np.abs(x)
 
     @abstractmethod
     def carrier(self, other: Any) -> Carrier:

@@ -52,8 +52,7 @@ def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: Co
 def may_be_on_axis(values: ComplexArray) -> Mask:
     """Return which eigenvalues are complex and so near to the axis that round-off decides; of matrices, shape (..., n)."""
     sizes = np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
-    near: Mask = (np.abs(values.real) < LOCATED * sizes) & (values.imag != 0) & (values.real != 0)
-    return near
+    return (np.abs(values.real) < LOCATED * sizes) & (values.imag != 0) & (values.real != 0)
 
 
 def off_axis(eigenvalues: Callable[[Array], ComplexArray], matrix: Array, values: ComplexArray) -> ComplexArray:

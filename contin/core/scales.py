@@ -59,13 +59,11 @@ def largest_entries(entries: Callable[[Array], Array], x: Array) -> Array:
     here = entries(x)
     with np.errstate(all="ignore"):
         beside = entries(x + ASIDE * (1 + np.abs(x)))
-    larger: Array = np.maximum(here, np.where(np.isfinite(beside), beside, 0.0))
-    return larger
+    return np.maximum(here, np.where(np.isfinite(beside), beside, 0.0))
 
 
 def usual(sizes: Array | float) -> Array:
     """Return sizes as powers of two; 1 for those of everyday size, and for zero, infinity and NaN."""
     sizes = np.abs(sizes)
     odd = np.isfinite(sizes) & (sizes > 0) & ((sizes < USUAL[0]) | (sizes > USUAL[1]))
-    result: Array = np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
-    return result
+    return np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)

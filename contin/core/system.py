@@ -183,16 +183,14 @@ class System(Discretization):
         longest = np.abs(v).max(initial=0.0)
         if not longest:
             return np.zeros(self.size)
-        found: Array = derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
-        return found
+        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
         longest = np.abs(v).max(initial=0.0)
         if name in self.problem.parameters or not longest:
             return np.zeros(self.size)
-        found: Array = derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
-        return found
+        return derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
 
     def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
         """Return what a function returns, and the estimated relative error of the derivatives that it took.

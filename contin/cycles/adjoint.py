@@ -41,5 +41,4 @@ def adjoint(system: Any, x: Array) -> Array:
     inverse = np.linalg.inv(basis.slope[:, 1:])
     for j in range(count):
         found[j * d + 1 : (j + 1) * d + 1] = inverse @ (-turned[j] - np.outer(basis.slope[:, 0], found[j * d]))
-    in_units: Array = found / system.scales.states
-    return in_units
+    return found / system.scales.states

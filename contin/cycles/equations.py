@@ -109,8 +109,7 @@ class PeriodicEquations(Collocation):
         if self.order == 1 or not turns.any():
             return values
         powers = np.array([np.linalg.matrix_power(self.turn, k) for k in range(self.order)])
-        found: Array = np.einsum("mab,mb->ma", powers[turns % self.order], values)
-        return found
+        return np.einsum("mab,mb->ma", powers[turns % self.order], values)
 
     def evaluate(self, x: Array, times: Array) -> Array:
         """Return the states at ``times`` (m,), any number of rounds on, shape (m, n)."""
@@ -118,8 +117,7 @@ class PeriodicEquations(Collocation):
         if not self.rotates or not turns.any():
             return states
         rounds, parts = np.divmod(turns, self.order)
-        found: Array = states + rounds[:, None] * self.gains[-1] + self.gains[parts]
-        return found
+        return states + rounds[:, None] * self.gains[-1] + self.gains[parts]
 
     def perturbation(self, v: Array, times: Array) -> Array:
         """Return the states of a perturbation, divided by their sizes, at ``times`` (m,), shape (m, n): angles gain nothing."""
@@ -213,16 +211,14 @@ class PeriodicEquations(Collocation):
     @functools.cached_property
     def _by_states(self) -> Columns:
         """Columns of the field's derivatives by the states."""
-        found: Columns = self.problem.batch("field").columns([])
-        return found
+        return self.problem.batch("field").columns([])
 
     def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""
         still, none = np.zeros(self.size), np.empty((0, self._n))
         wide = [self._wide(still, states) for states in directions]
         points, p = self.at_gauss_points(x), self._scaled_parameters(x)
-        found: Array = self._field.along(self.gauss_times, points, none, p, wide)[:, : self._n]
-        return found
+        return self._field.along(self.gauss_times, points, none, p, wide)[:, : self._n]
 
     def _jacobian_of_field(self, x: Array) -> Array:
         """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
@@ -303,8 +299,7 @@ class PeriodicEquations(Collocation):
         if self.order == 1:
             return values
         angles = self.order * values.imag
-        found: ComplexArray = self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
-        return found
+        return self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
 
     @abstractmethod
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
@@ -346,8 +341,7 @@ class ForcedEquations(PeriodicEquations):
         moved[self._free] *= 1 + ASIDE
         here, there = (breaks_of(self.problem.batch("field"), self.problem.domain, p) for p in (self.parameters, moved))
         still = np.abs(here[:, None] - there) <= LOCATED if there.size else np.zeros((here.size, 1), dtype=bool)
-        found: Array = here[still.any(axis=1)]
-        return found
+        return here[still.any(axis=1)]
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
@@ -453,8 +447,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     def rates(self, x: Array, points: Array) -> Array:
         """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
         n, times = self._n, np.zeros(len(points))
-        rates: Array = self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
-        return rates
+        return self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
 
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""
@@ -483,8 +476,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     @functools.cached_property
     def _mean_turn(self) -> Array:
         """The mean of the powers of the symmetry."""
-        found: Array = np.mean([np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)], axis=0)
-        return found
+        return np.mean([np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)], axis=0)
 
     @property
     def amplitude_row(self) -> Array:
@@ -500,8 +492,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
     def _with(self, **changes: object) -> CycleEquations:
         other: Any = super()._with(**changes)
         other._set_reference(self.reference)
-        found: CycleEquations = other
-        return found
+        return other
 
     def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
         """Return the same on another mesh, with the same reference, and the carrier."""
@@ -559,5 +550,4 @@ def is_opposite(frequency: float) -> bool:
 
 def is_pair(values: ComplexArray) -> Mask:
     """Return which logarithms belong to multipliers that are not real."""
-    found: Mask = (values.imag != 0) & (np.abs(values.imag) != math.pi)
-    return found
+    return (values.imag != 0) & (np.abs(values.imag) != math.pi)

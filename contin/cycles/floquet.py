@@ -141,8 +141,7 @@ def _apart(values: ComplexArray, others: ComplexArray) -> Array:
 
     gaps = values[:, None] - others
     gaps = np.abs(gaps.real + 1j * ((gaps.imag + math.pi) % (2 * math.pi) - math.pi))
-    distances: Array = gaps[linear_sum_assignment(gaps)]
-    return distances
+    return gaps[linear_sum_assignment(gaps)]
 
 
 def _trivial(system: PeriodicEquations | MapEquations, x: Array) -> int | None:
@@ -252,8 +251,7 @@ def _without_trivial(trial: Trial) -> ComplexArray:
     """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
     system: Any = trial.system
     values, trivial = system.eigenvalues(trial.x), _trivial(system, trial.x)
-    found: ComplexArray = values if trivial is None else np.delete(values, trivial)
-    return found
+    return values if trivial is None else np.delete(values, trivial)
 
 
 def keep_off_one(arc: Arc) -> bool:

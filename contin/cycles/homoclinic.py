@@ -98,8 +98,7 @@ def _liveliness(trial: Trial) -> float:
 
 def _speeds(system: Any, x: Array) -> Array:
     """Return the speeds of a cycle at the Gauss points, scaled, shape (N d,)."""
-    speeds: Array = np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
-    return speeds
+    return np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
 
 
 def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:
@@ -124,8 +123,7 @@ def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, Complex
 def _spectrum(system: CycleEquations, x: Array, states: Array) -> ComplexArray:
     """Return the eigenvalues of an equilibrium, the largest real part first."""
     values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
-    found: ComplexArray = values[np.argsort(-values.real)]
-    return found
+    return values[np.argsort(-values.real)]
 
 
 def _fold_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:

@@ -100,8 +100,7 @@ class MapEquations(AlgebraicEquations):
         """Return the values of the problem's functionals at the first point, in their order."""
         if not self.problem.functionals:
             return np.empty(0)
-        values: Array = self.problem.batch("functionals").values(*self._arguments(x, self.states(x)[:1]))[0]
-        return values
+        return self.problem.batch("functionals").values(*self._arguments(x, self.states(x)[:1]))[0]
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
         """Return the derivatives of a parameter or functional by x, shape (size,)."""
@@ -121,8 +120,7 @@ class MapEquations(AlgebraicEquations):
 
     def _images(self, x: Array, states: Array) -> Array:
         """Return f at states (K, n), shape (K, n)."""
-        images: Array = self.problem.batch("map").values(*self._arguments(x, states))
-        return images
+        return self.problem.batch("map").values(*self._arguments(x, states))
 
     def _missed(self, x: Array, images: Array) -> Array:
         """Return f(u_j) - u_(j+1), shape (equations,), of the images f(u_j); the last one gains whole rounds of angles."""
@@ -176,8 +174,7 @@ class MapEquations(AlgebraicEquations):
     def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""
         batch = self.problem.batch("map")
-        found: tuple[Array, Array] = batch.jacobian(*self._arguments(x, self.states(x)), batch.columns(self._indices(names)))
-        return found
+        return batch.jacobian(*self._arguments(x, self.states(x)), batch.columns(self._indices(names)))
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, a sparse array where `is_sparse`."""
@@ -207,8 +204,7 @@ class MapEquations(AlgebraicEquations):
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
-        columns: Array = self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
-        return columns
+        return self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
 
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several stacks of directions: f at every point; the rest is linear."""
@@ -256,8 +252,7 @@ class MapEquations(AlgebraicEquations):
     def jacobian(self, x: Array) -> Array:
         """Return F_u, shape (equations, equations)."""
         matrix = self.differentiated(x, ())[1]
-        found: Array = matrix.toarray() if self.is_sparse else matrix
-        return found
+        return matrix.toarray() if self.is_sparse else matrix
 
     # --- stability -----------------------------------------------------------------------------------------------
 
@@ -304,8 +299,7 @@ class MapEquations(AlgebraicEquations):
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other: Any = self.with_parameters({ROUNDS: 2.0 * self.rounds})
         states = self.states(x)
-        found: tuple[Self, Array] = other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
-        return found
+        return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapEquations, Array]:
         """Return the same."""

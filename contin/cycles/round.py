@@ -81,8 +81,7 @@ def _by_parts(solve: Callable[[Array], Array], values: Array) -> Array:
     if np.isrealobj(values):
         return solve(values)
     real, imaginary = solve(np.stack([values.real, values.imag]))
-    found: Array = real + 1j * imaginary
-    return found
+    return real + 1j * imaginary
 
 
 class Solver:
@@ -206,8 +205,7 @@ class Round:
     def direction(self) -> Array:
         """The row e, by the states at t = 0."""
         system: Any = self.system
-        found: Array = system.start_direction
-        return found
+        return system.start_direction
 
     @functools.cached_property
     def free_by_period(self) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import weakref
-from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -21,7 +20,7 @@ from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCo
 from contin.equilibria.statement import AlgebraicProblem, ReducedProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature
+from contin.functions.signature import Arguments, Signature, named_values
 from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
 from contin.problems.mass import Mass
 from contin.problems.own_names import PERIOD, ROUNDS
@@ -241,8 +240,7 @@ class CycleProblem(BoundaryValueProblem):
         parameters = {name: value for name, value in self.parameters.items() if name not in own}
 
         def of_kept(function: Function) -> Function:
-            found: Function = mass.of_kept(function, self.field, names, start, arguments)
-            return found
+            return mass.of_kept(function, self.field, names, start, arguments)
 
         def state(place: int) -> Function:
             return lambda *given: given[-2][place]
@@ -350,7 +348,7 @@ class CycleProblem(BoundaryValueProblem):
         """
         if self.period is None:
             return parameters[PERIOD]
-        values: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
+        values = named_values(tuple(parameters))
         value = self.period(values(**parameters))
         if not checks.is_number(value) or not 0 < value < math.inf:
             raise ProblemError(f"period: {checks.shown(value)} must be a positive number")
@@ -371,7 +369,7 @@ class CycleProblem(BoundaryValueProblem):
 
 def _at_time(field: Function, names: Sequence[str]) -> Function:
     """Return a forced field as one whose time is a parameter."""
-    known: Any = namedtuple("P", names)  # type: ignore[misc]  # noqa: PYI024
+    known = named_values(tuple(names))
     return lambda u, p: field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in names)))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.draws import PLACES, generator
 from contin.errors import ProblemError
+from contin.functions.signature import named_values
 from contin.levels import LOCATED
 from contin.problems.angles import whole_rounds
 
@@ -64,8 +64,7 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
     """
     if order_of(matrix) == 1:
         return
-    of_state: Any = namedtuple("U", names)  # type: ignore[misc]  # noqa: PYI024
-    of_parameters: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
+    of_state, of_parameters = named_values(tuple(names)), named_values(tuple(parameters))
     p = of_parameters(**parameters)
     for u in generator("symmetry").uniform(-1, 1, (PLACES, len(names))):
         try:
@@ -106,7 +105,7 @@ def _product(row: Sequence[float], u: Sequence[Any]) -> Any:
 
 def averaged(function: Function, matrix: Array, names: Sequence[str], order: int) -> Function:
     """Return the mean of a functional over u, S u, ..., S^(n-1) u, as a function of (t, u, p)."""
-    state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
+    state = named_values(tuple(names))
     powers = [np.linalg.matrix_power(matrix, k).tolist() for k in range(order)]
 
     def mean(t: Any, u: Any, p: Any) -> Any:

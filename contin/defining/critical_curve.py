@@ -80,8 +80,7 @@ class CriticalCurve(Defining):
 
     def form(self, x: Array) -> Form:
         """Return the characteristic matrix without the multiplier that is one along every autonomous cycle."""
-        found: Form = self.base.form(self.inside(x)).reduced
-        return found
+        return self.base.form(self.inside(x)).reduced
 
     def computed(self, x: Array) -> tuple[Form, Bordered]:
         """Return the characteristic matrix, and it bordered."""
@@ -114,8 +113,7 @@ class CriticalCurve(Defining):
     def own_values(self, x: Array) -> Array:
         """Return g."""
         found: Bordered = self.at(x)[1]
-        g: Array = found.g[0]
-        return g
+        return found.g[0]
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""

@@ -126,8 +126,7 @@ class EventCurve(Defining):
 
     def judged(self, point: SpecialPoint) -> SpecialPoint:
         """Return a special point, by the label and name that the kind knows it by."""
-        found: SpecialPoint = self.base.judged_on_curve(point, _solution(point.trial))
-        return found
+        return self.base.judged_on_curve(point, _solution(point.trial))
 
 
 def _confirmed(trial: Trial) -> float:

@@ -84,8 +84,7 @@ class FoldCurve(Defining):
     def own_values(self, x: Array) -> Array:
         """Return g."""
         found: Bordered = self.at(x)[0]
-        g: Array = found.g[0]
-        return g
+        return found.g[0]
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""

@@ -24,7 +24,6 @@ import numpy as np
 
 from contin.arrays import Array, Function
 from contin.collocation.mesh import MeshControl
-from contin.collocation.switching import Switching
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.system import System
@@ -50,6 +49,15 @@ class Known(NamedTuple):
     residual: Array
     factors: Factors
     solutions: Array
+
+
+def _of_the_base(name: str) -> Any:
+    """Return the method of this name of the system along which a curve runs, at the unknowns that it knows."""
+
+    def method(self: Defining, x: Array, *more: Any) -> Any:
+        return getattr(self.base, name)(self.inside(x), *more)
+
+    return method
 
 
 class Defining(Discretization):
@@ -158,8 +166,7 @@ class Defining(Discretization):
         key, name = x.tobytes(), compute.__name__
         if self._known.get(name, (b"", None))[0] != key:
             self._known[name] = key, compute(x)
-        found: T = self._known[name][1]
-        return found
+        return self._known[name][1]
 
     def inside(self, x: Array) -> Array:
         """Return the unknowns of the underlying system."""
@@ -234,31 +241,13 @@ class Defining(Discretization):
         inside: Any = _Inside(factors, self)
         return self.base.cut_off_errors(self.inside(x), inside)
 
-    def states(self, x: Array) -> Array:
-        """Return the states of the underlying system."""
-        return self.base.states(self.inside(x))
-
-    def evaluate(self, x: Array, times: Array) -> Array:
-        """Return the states of the underlying boundary value problem at ``times`` (m,), shape (m, n)."""
-        base: Any = self.base
-        states: Array = base.evaluate(x[: base.size], times)
-        return states
-
-    def all_parameters(self, x: Array) -> Array:
-        """Return the values of all parameters."""
-        return self.base.all_parameters(self.inside(x))
-
-    def parameter(self, x: Array, name: str) -> float:
-        """Return the value of one parameter."""
-        return self.base.parameter(self.inside(x), name)
+    states, evaluate, all_parameters, parameter, functionals, switching = map(
+        _of_the_base, ("states", "evaluate", "all_parameters", "parameter", "functionals", "switching")
+    )
 
     def parameter_index(self, name: str) -> int:
         """Return the place of the free parameter ``name`` in x."""
         return self.base.parameter_index(name)
-
-    def functionals(self, x: Array) -> Array:
-        """Return the functionals of the underlying problem."""
-        return self.base.functionals(self.inside(x))
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
         """Return the derivatives of a column of the underlying problem by x; None where they are not known."""
@@ -278,10 +267,6 @@ class Defining(Discretization):
     def refined(self) -> tuple[Defining, Carrier] | None:
         """Return the defining system on every interval halved, and the carrier."""
         return self._moved(self.base.refined())
-
-    def switching(self, x: Array) -> Switching:
-        """Return where conditions switch along the solution of the underlying system."""
-        return self.base.switching(self.inside(x))
 
     def on_switches(self, x: Array, closely: bool = False) -> tuple[Defining, Carrier] | None:
         """Return the defining system on a mesh with those places among its points, and the carrier."""
@@ -341,8 +326,7 @@ class _Inside:
         base = self._system.base
         wide = np.zeros((*b.shape[:-1], self._system.equations + 1))
         wide[..., : base.equations], wide[..., -1] = b[..., :-1], b[..., -1]
-        found: Array = self._factors.solve(wide)[..., : base.size]
-        return found
+        return self._factors.solve(wide)[..., : base.size]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -376,8 +360,7 @@ class _Statement:
     @property
     def angles(self) -> Mapping[str, float]:
         """Those of the problem."""
-        found: Mapping[str, float] = self.problem.angles
-        return found
+        return self.problem.angles
 
     @property
     def symmetries(self) -> Mapping[str, Any]:

@@ -104,8 +104,7 @@ def _null_vectors(matrix: Array) -> Array:
     """Return a basis of the v with matrix v = 0, as rows; there are as many rows as columns, or more."""
     balanced, columns = _balanced(matrix)
     _, values, vectors = np.linalg.svd(np.linalg.qr(balanced, mode="r"))
-    found: Array = vectors[values <= _zero(len(values)) * values[0]] / columns
-    return found
+    return vectors[values <= _zero(len(values)) * values[0]] / columns
 
 
 def _reduced(vectors: Array) -> Array:
@@ -121,8 +120,7 @@ def _reduced(vectors: Array) -> Array:
             others = np.arange(len(vectors)) != number
             vectors[others] -= vectors[others, place, None] * vectors[number]
             number += 1
-    found: Array = np.where(np.abs(vectors) > LOCATED, vectors, 0.0)
-    return found
+    return np.where(np.abs(vectors) > LOCATED, vectors, 0.0)
 
 
 def _first(vector: Array) -> int:

@@ -64,8 +64,7 @@ class AlgebraicEquations(Spectral, System):
     @property
     def named_states(self) -> tuple[str, ...]:
         """Names of the states."""
-        found: tuple[str, ...] = self.problem.state_names
-        return found
+        return self.problem.state_names
 
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
@@ -84,8 +83,7 @@ class AlgebraicEquations(Spectral, System):
     def residual(self, x: Array) -> Array:
         """Return F at x, shape (equations,)."""
         u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        values: Array = self._residual.values(_NO_TIME, u, self._none, p)[0]
-        return values
+        return self._residual.values(_NO_TIME, u, self._none, p)[0]
 
     @functools.cached_property
     def _residual(self) -> Any:
@@ -95,8 +93,7 @@ class AlgebraicEquations(Spectral, System):
     @functools.cached_property
     def _by_unknowns(self) -> Columns:
         """Columns of the residual's derivatives by the unknowns."""
-        found: Columns = self._residual.columns(self._free)
-        return found
+        return self._residual.columns(self._free)
 
     @functools.cached_property
     def _by_states(self) -> tuple[Batch, Columns]:
@@ -173,8 +170,7 @@ class AlgebraicEquations(Spectral, System):
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         batch = self._residual
         if self.problem.jacobian is not None:
-            found: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(which, ()))[1][0]
-            return found
+            return batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(which, ()))[1][0]
         columns_of = batch.columns(which)
         if self.is_sparse:
             rows, places = columns_of.rows, columns_of.places
@@ -182,18 +178,15 @@ class AlgebraicEquations(Spectral, System):
             columns = np.zeros((self.equations, len(which)))
             columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
             return columns
-        dense: Array = batch.jacobian(_NO_TIME, u, self._none, p, columns_of)[1][0, :, n:]
-        return dense
+        return batch.jacobian(_NO_TIME, u, self._none, p, columns_of)[1][0, :, n:]
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
-        product: Array = self._jacobian(x)[1].T @ w
-        return product
+        return self._jacobian(x)[1].T @ w
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several directions, shape (equations,)."""
-        found: Array = self.stack_along(x, [v[None] for v in directions])[0]
-        return found
+        return self.stack_along(x, [v[None] for v in directions])[0]
 
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return it along several stacks of directions, shape (K, size) each or, of states alone, (K, n); (K, equations)."""
@@ -205,8 +198,7 @@ class AlgebraicEquations(Spectral, System):
         for inputs, stack in zip(wide, directions):
             inputs[:, :n] = stack[:, :n]
             inputs[:, n + self._free] = stack[:, n:] if stack.shape[1] > n else 0.0
-        found: Array = self._residual.along(np.zeros(count), u, self._none, p, wide)
-        return found
+        return self._residual.along(np.zeros(count), u, self._none, p, wide)
 
     def _along_given(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along directions by differences of the user's Jacobian, in place of the residual's.
@@ -216,12 +208,10 @@ class AlgebraicEquations(Spectral, System):
         *others, last = (np.append(v, np.zeros(x.size - v.size)) for v in directions)
 
         def product(at: Array) -> Array:
-            found: Array = self._jacobian(at)[1] @ last
-            return found
+            return self._jacobian(at)[1] @ last
 
         def bend(v: Array) -> Array:
-            found: Array = derivative(lambda s: product(x + s * v), len(others), 1 / np.abs(v).max())[0]
-            return found
+            return derivative(lambda s: product(x + s * v), len(others), 1 / np.abs(v).max())[0]
 
         return of_lines(bend, others) if others else product(x)
 
@@ -231,8 +221,7 @@ class AlgebraicEquations(Spectral, System):
             return super().bent(x, w, v)  # two Jacobians instead of one value for each entry
         u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
         wide = self._wide(v, v[None, :n])
-        found: Array = batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]
-        return found
+        return batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]
 
     @property
     def _evaluated(self) -> Sequence[Batch]:
@@ -241,8 +230,7 @@ class AlgebraicEquations(Spectral, System):
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
-        jacobian: Array = self.jacobians(x, self.states(x))[0]
-        return jacobian
+        return self.jacobians(x, self.states(x))[0]
 
     def jacobians(self, x: Array, states: Array) -> Array:
         """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
@@ -255,8 +243,7 @@ class AlgebraicEquations(Spectral, System):
 
     def field_jacobian(self, x: Array) -> Array:
         """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
-        jacobian: Array = self._jacobian(x)[1][:, : self.state_size]
-        return jacobian
+        return self._jacobian(x)[1][:, : self.state_size]
 
     def as_field(self) -> AlgebraicEquations:
         """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
@@ -299,8 +286,7 @@ class AlgebraicEquations(Spectral, System):
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
-        values: Array = batch.values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
-        return values
+        return batch.values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
         """Return the derivatives of a parameter or functional by x, shape (size,)."""
@@ -309,8 +295,7 @@ class AlgebraicEquations(Spectral, System):
             return super().column_gradient(x, name)
         batch = self._batch("functionals")
         u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        gradient: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(self._free))[1][0, names.index(name)]
-        return gradient
+        return batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(self._free))[1][0, names.index(name)]
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,)."""
@@ -321,8 +306,7 @@ class AlgebraicEquations(Spectral, System):
         weights = np.zeros((1, len(names)))
         weights[0, names.index(name)] = 1.0
         given = _NO_TIME, x[:n].reshape(1, -1), self._none, self._scaled_parameters(x)
-        found: Array = batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
-        return found
+        return batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[AlgebraicEquations, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
@@ -331,8 +315,7 @@ class AlgebraicEquations(Spectral, System):
 
         def entries(at: Array) -> Array:
             jacobian = abs(scaled._jacobian(at)[1])
-            found: Array = jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
-            return found
+            return jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
 
         rows = usual(largest_entries(entries, z))
         return self._with(scales=Scales(states, parameters, {"residual": rows})), z

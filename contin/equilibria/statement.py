@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, cast
@@ -20,7 +19,7 @@ from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature, argument_count, result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
 from contin.levels import LOCATED
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass
@@ -237,7 +236,7 @@ class AlgebraicProblem(Restated):
         assert self.jacobian is not None
         arguments: Any = (u, p)
         if not self._signature.fills(self.residual):
-            kinds: list[Any] = [namedtuple("Values", names) for names in (self.state_names, tuple(self.parameters))]  # noqa: PYI024
+            kinds = [named_values(names) for names in (self.state_names, tuple(self.parameters))]
             arguments = [kind(*values.tolist()) for kind, values in zip(kinds, (u, p))]
         found = self.jacobian(*arguments)
         shape = (self.equation_size, len(self.state_names))
@@ -270,8 +269,7 @@ class KeptProblem(AlgebraicProblem):
         mass, names = whole.mass, whole.state_names
 
         def of_kept(function: Function) -> Function:
-            found: Function = mass.of_kept(function, whole.residual, names, start, 2)
-            return found
+            return mass.of_kept(function, whole.residual, names, start, 2)
 
         functionals = {name: of_kept(function) for name, function in whole.functionals.items()}
         functionals |= {names[i]: of_kept(_state(names[i])) for i in mass.columns}
@@ -360,8 +358,7 @@ class ReducedProblem(AlgebraicProblem):
 
     def _states(self, u: Array, totals: Array) -> Array:
         """Return all states."""
-        found: Array = self._follow @ np.append(u, totals)
-        return found
+        return self._follow @ np.append(u, totals)
 
     @property
     def conserved(self) -> str:
@@ -382,7 +379,7 @@ def _of_whole(
     kept: Sequence[int] | None = None,
 ) -> Function:  # fmt: skip
     """Return a function of all states as one of the states that are kept and the totals; of several values those to keep."""
-    state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
+    state = named_values(tuple(names))
 
     def reduced(u: Any, p: Any) -> Any:
         values = function(state(*combined(follow, [*u, *(getattr(p, name) for name in totals)])), p)

@@ -47,8 +47,7 @@ class _Bordered:
 
     def solve(self, b: Array) -> Array:
         """Return the unknowns."""
-        found: Array = self._factors.solve(np.append(b, 0.0))[: self._size]
-        return found
+        return self._factors.solve(np.append(b, 0.0))[: self._size]
 
 
 def at_branch_point(trial: Trial) -> Accuracy:

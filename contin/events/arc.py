@@ -159,14 +159,12 @@ class Arc:
     def guess(self, distance: float) -> Array:
         """Return the cubic through both ends and their tangents at a distance, shape (size,)."""
         s = distance / self.step
-        found: Array = np.array([1.0, s, s * s, s * s * s]) @ self._cubic
-        return found
+        return np.array([1.0, s, s * s, s * s * s]) @ self._cubic
 
     def direction(self, distance: float) -> Array:
         """Return the derivative of the cubic at a distance, by the part of the step, shape (size,)."""
         s = distance / self.step
-        found: Array = np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ self._cubic
-        return found
+        return np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ self._cubic
 
     @functools.cached_property
     def _cubic(self) -> Array:

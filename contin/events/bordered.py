@@ -72,8 +72,7 @@ class BorderedMatrix:
 
     def multipliers(self) -> Array:
         """Return w, the row of the inverse that belongs to psi: w.psi = 1, dg = -w.F_xy v; about the left null vector."""
-        w: Array = self._bordered.left[0]
-        return w
+        return self._bordered.left[0]
 
     @property
     def fits(self) -> bool:

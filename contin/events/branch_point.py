@@ -104,8 +104,7 @@ class BranchPoint(Finding):
         >>> bool(locate_branch_point(system, np.array([0.1, 0.1])).round_off(system, Newton()).max() < 1e-12)
         True
         """
-        found: Array = rounded_off(system, self, newton)[system.state_size :]
-        return found
+        return rounded_off(system, self, newton)[system.state_size :]
 
     @property
     def leaving(self) -> tuple[Array, ...]:

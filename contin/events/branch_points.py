@@ -234,5 +234,4 @@ class BranchPointSearch:
 def _shares(values: ComplexArray) -> Array:
     """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
     sizes = np.abs(values)
-    shares: Array = 1 - 1 / (1 + sizes)  # an infinite one, too
-    return shares
+    return 1 - 1 / (1 + sizes)  # an infinite one, too

@@ -239,8 +239,7 @@ class _Watch:
                 return None
             decided = changes >= changes[steady].max()
             if np.all(converged[decided]) and np.all(decided | (values.real > 0)):
-                found: ComplexArray = values[decided]
-                return found
+                return values[decided]
         return None
 
 

@@ -257,8 +257,7 @@ class Inspection:
     @functools.cached_property
     def _own_home(self) -> SpecialPoint | None:
         """The end of the branch that the kind of problem knows."""
-        found: SpecialPoint | None = self.arc.trial.system.home(self.arc)
-        return found
+        return self.arc.trial.system.home(self.arc)
 
     @functools.cached_property
     def _home(self) -> SpecialPoint | None:
@@ -415,13 +414,7 @@ def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
 
     Others stay as given.
     """
-    ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != Label.FOLD)
-    rank = {id(point): number for number, point in enumerate(ranked)}
-    along = sorted(ranked, key=lambda point: point.at)
-    groups: list[list[SpecialPoint]] = []
-    for point in along:
-        if groups and point.at - groups[-1][-1].at < _AT_ONCE:
-            groups[-1].append(point)
-        else:
-            groups.append([point])
-    return [point for group in groups for point in sorted(group, key=lambda point: rank[id(point)])]
+    order = sorted(points, key=lambda point: point.at)
+    group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
+    place = {id(point): number for point, number in zip(order, group)}
+    return sorted(points, key=lambda point: (place[id(point)], point.test is not None and point.test.label != Label.FOLD))

@@ -105,8 +105,7 @@ class InterpolatedZero(Finding):
     def split(self, system: Discretization) -> Array:
         """Return the error that Newton's method, or round-off, has left of the points around it."""
         left = self.newton_error * (1 + np.abs(self.trial.x[system.state_size :]))
-        found: Array = np.maximum(left, self.noise[system.state_size :])
-        return found
+        return np.maximum(left, self.noise[system.state_size :])
 
     def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.
@@ -180,8 +179,7 @@ def _around(arc: Arc, window: Window) -> list[Trial]:
 def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
     """Return the polynomial through points at a place beyond them, shape (size,)."""
     weights = 1 / np.prod(places[:, None] - places + np.eye(len(places)), axis=1)
-    guess: Array = interpolation(places, weights, np.array([place]))[0] @ np.array([point.x for point in points])
-    return guess
+    return interpolation(places, weights, np.array([place]))[0] @ np.array([point.x for point in points])
 
 
 def _interpolated(window: Window, points: Sequence[Trial], functions: Functions, count: int) -> InterpolatedZero:

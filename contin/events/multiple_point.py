@@ -97,8 +97,7 @@ class MultiplePoint(Finding):
 
     def split(self, system: Discretization) -> Array:
         """Return by how much free parameters differ between it and the simple branch points that it may consist of."""
-        found: Array = self.spread * np.abs(self.tangents[0][system.state_size :])
-        return found
+        return self.spread * np.abs(self.tangents[0][system.state_size :])
 
     @property
     def nullity(self) -> int:  # type: ignore[override]

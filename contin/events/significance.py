@@ -84,8 +84,7 @@ def growing(system: Discretization, x: Array, tangent: Array, primary: str, newt
     """
     at = system.parameter_index(primary)
     if abs(tangent[at]) >= CLEAR:
-        found: Array = tangent * np.sign(tangent[at])
-        return found
+        return tangent * np.sign(tangent[at])
     row = system.weights * tangent
     try:
         places = [correct(system, x + s * tangent, row, row @ x + s, newton).x for s in (-BESIDE, BESIDE)]

@@ -114,8 +114,7 @@ def _rate(real: Matrix, imaginary: Matrix, at: Vector, rows: IndexVector, k: int
     k = min(max(k, 0), rows.size - 2)
     one, other = rows[k], rows[k + 1]
     apart = math.hypot(real[other, i] - real[one, i], imaginary[other, i] - imaginary[one, i])
-    rate: float = apart / (at[other] - at[one])
-    return rate
+    return apart / (at[other] - at[one])
 
 
 @helper

@@ -192,8 +192,7 @@ class Batch:
         inputs = (*(range(states) if order is None else map(int, order)), *(states + int(slot) for slot in free))
         if ("columns", inputs) not in kept:
             kept["columns", inputs] = Columns(np.array(inputs, dtype=np.int64), *self._own.entries(inputs))
-        found: Columns = kept["columns", inputs]
-        return found
+        return kept["columns", inputs]
 
     @functools.cached_property
     def depends(self) -> Pattern:

@@ -320,8 +320,7 @@ def interpret(builder: Builder, memory: Memory, widths: Widths, lanes: int, firs
     builder.store(builder.add(now, _number(1)), place)
     builder.branch(head)
     builder.position_at_end(end)
-    stopped: int = builder.load(place)
-    return stopped
+    return builder.load(place)
 
 
 # --- the rest of the kernel, and the kernel
@@ -486,8 +485,7 @@ def _give_up(work, lists, row, lanes):
 @instruction
 def _address(builder: Builder, array: Any, offset: int) -> int:
     """Return an address in an array."""
-    there: int = builder.add(array.address, offset)
-    return there
+    return builder.add(array.address, offset)
 
 
 class Instructions(NamedTuple):
@@ -568,12 +566,12 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 @instruction
 def _bits(builder: Builder, value: float) -> int:
-    return builder.bitcast(value, whole())  # type: ignore[no-any-return]
+    return builder.bitcast(value, whole())
 
 
 @instruction
 def _number_of(builder: Builder, bits: int) -> float:
-    return builder.bitcast(bits, double())  # type: ignore[no-any-return]
+    return builder.bitcast(bits, double())
 
 
 @helper

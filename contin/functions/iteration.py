@@ -105,8 +105,7 @@ class Search:
         """Return the unknowns at one point, found by the interpreter, for ``values`` of the inputs by slot; nan where there
         are none."""
         slots, found = tape.kept(("search", self), lambda: self._function(tape))
-        result: list[float] = found(np.array([[values[slot] for slot in slots]], dtype=float))[0].tolist()
-        return result
+        return found(np.array([[values[slot] for slot in slots]], dtype=float))[0].tolist()
 
     def _function(self, tape: Tape) -> tuple[list[Any], Callable[[Array], Array]]:
         """Return the slots of the inputs of the search, and the function that takes their values to the unknowns."""

@@ -160,7 +160,7 @@ def instruction(write: Callable[Concatenate[Builder, _Parameters], _Result]) -> 
     The body is written once, as a function that all calls share.
     """
     written: Any = Instruction(write)
-    return written  # type: ignore[no-any-return]
+    return written
 
 
 def llvm() -> Any:

@@ -213,8 +213,7 @@ def _called(address: int | None, name: str, doc: str | None) -> Callable[..., An
     _KEPT.append(method)
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype, make.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    function: Callable[..., Any] = make(ctypes.addressof(method), (np.ndarray, None, TypeError), module)
-    return function
+    return make(ctypes.addressof(method), (np.ndarray, None, TypeError), module)
 
 
 @functools.cache

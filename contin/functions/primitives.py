@@ -88,8 +88,7 @@ def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
 def _negated(tape: Recorder, place: int) -> int | None:
     """Return what an operation is the negative of."""
     operation = tape.operations[place]
-    negated: int | None = operation.operands[0] if operation.name == "neg" else None
-    return negated
+    return operation.operands[0] if operation.name == "neg" else None
 
 
 def _simple_add(tape: Recorder, places: Places) -> int | None:

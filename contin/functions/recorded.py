@@ -160,8 +160,7 @@ class Recorded:
         return self.kept[key]
 
     def _made(self, request: Request) -> _Made:
-        found: _Made = self._once(request, lambda: self._make(request))
-        return found
+        return self._once(request, lambda: self._make(request))
 
     def _make(self, request: Request) -> _Made:
         """Return the program: values, or their derivatives along directions, and slopes."""

@@ -397,8 +397,7 @@ def _square(matrix: object, name: str) -> list[list[Any]]:
         raise Unrecordable(
             f"it calls np.linalg.{name} or np.linalg.solve for a matrix of more than {_LARGEST_INVERSE} rows that varies"
         )
-    rows: list[list[Any]] = given.tolist()
-    return rows
+    return given.tolist()
 
 
 def _solved(a: object, b: object) -> Any:

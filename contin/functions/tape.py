@@ -388,8 +388,7 @@ def power(base: Number, exponent: Any) -> Number:
     if known == 0.5:
         return tape.apply("sqrt", base)
     if known == math.floor(known) and abs(known) <= LARGEST_POWER:
-        found: Number = whole_power(tape.number(1.0), base, int(known))
-        return found
+        return whole_power(tape.number(1.0), base, int(known))
     return tape.apply("pow", base, known)
 
 

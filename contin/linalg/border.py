@@ -164,5 +164,4 @@ def _largest_part(vector: Numbers) -> Array:
     """Return the real part, of unit length, of a vector: of a complex one, turned so that its real part is the largest."""
     if np.iscomplexobj(vector):
         vector = (vector * np.exp(-0.5j * np.angle(vector @ vector))).real
-    found: Array = vector / np.linalg.norm(vector)
-    return found
+    return vector / np.linalg.norm(vector)

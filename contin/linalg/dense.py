@@ -87,7 +87,7 @@ class DenseFactors:
         if self._is_small:
             self._lu, self._exchanges = np.empty(matrix.shape), np.empty(len(matrix), dtype=np.int64)
             sign = factor_matrix(np.ascontiguousarray(matrix, dtype=float), self._lu, self._exchanges)
-            self._singular = sign == 0
+            self._singular = not abs(sign) > 0  # or not finite
         else:
             self._lu, self._exchanges, zero_pivot = (_lapack().zgetrf if self._is_complex else _lapack().dgetrf)(matrix)
             self._singular = zero_pivot > 0

@@ -58,8 +58,7 @@ def oriented_along(vector: Array, cosine: float) -> Array:
     >>> oriented_along(np.array([0.0, -1.0]), -1e-16).tolist(), oriented_along(np.array([0.6, -0.8]), 0.6).tolist()
     ([-0.0, 1.0], [0.6, -0.8])
     """
-    found: Array = vector * np.sign(cosine) if abs(cosine) > _ORTHOGONAL else oriented(vector)
-    return found
+    return vector * np.sign(cosine) if abs(cosine) > _ORTHOGONAL else oriented(vector)
 
 
 def canonical_basis(vectors: Array, weights: Array | float = 1.0) -> Array:

@@ -97,8 +97,7 @@ def product_of(count: int, n: int) -> Product:
 @functools.lru_cache(maxsize=32)
 def _first_basis(n: int) -> Array:
     """Return an orthogonal matrix to start from, always the same."""
-    basis: Array = np.ascontiguousarray(np.linalg.qr(generator("periodic").standard_normal((n, n)))[0].T)
-    return basis
+    return np.ascontiguousarray(np.linalg.qr(generator("periodic").standard_normal((n, n)))[0].T)
 
 
 def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:

@@ -143,8 +143,7 @@ def _transformed(inverse: Function, n: int, pole: float, zero: float, count: int
     values = np.asarray(values, dtype=complex)
     with np.errstate(all="ignore"):
         back: Any = (pole * values + zero) / (values - 1) if zero else pole + 1 / values
-    kept: ComplexArray = back[np.isfinite(back)]
-    return kept
+    return back[np.isfinite(back)]
 
 
 def _distinct(values: ComplexArray) -> ComplexArray:

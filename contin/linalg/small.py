@@ -83,7 +83,6 @@ def factor_matrix(matrix: ReadOnlyMatrix, lu: Matrix, exchanges: IndexVector) ->
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             if not abs(matrix[i, j]) < math.inf:
-                lu[:] = math.nan
                 return math.nan
     return factor_small(matrix, lu, exchanges)
 

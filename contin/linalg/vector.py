@@ -38,8 +38,7 @@ class Rows(NamedTuple):
 @instruction
 def address(builder: Builder, array: Any, offset: int) -> int:
     """Return an address in an array."""
-    there: int = builder.add(array.address, offset)
-    return there
+    return builder.add(array.address, offset)
 
 
 @instruction
@@ -63,8 +62,7 @@ def within(builder: Builder, rows: Rows, i: int, j: int) -> Rows:
 @instruction
 def entry(builder: Builder, vector: int, i: int) -> int:
     """Return the address of an entry of a vector whose entries are `LANES` numbers."""
-    there: int = _entry(builder, vector, i)
-    return there
+    return _entry(builder, vector, i)
 
 
 # --- elimination -----------------------------------------------------------------------------------------------------
@@ -164,8 +162,7 @@ def reduce_column(builder: Builder, pivot: Rows, count: int, column: int, size: 
         builder.store(builder.select(larger, ahead, builder.load(best)), best)
         builder.store(builder.select(larger, loop.index, builder.load(where)), where)
         builder.store(builder.add(address, pivot.stride), row)
-    result: int = builder.load(where)
-    return result
+    return builder.load(where)
 
 
 @instruction

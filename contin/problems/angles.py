@@ -61,8 +61,7 @@ def periods_of(problem: Angular) -> Array:
 
 def whole_rounds(apart: Array, periods: Array) -> Array:
     """Return the multiples of the periods (n,) that are nearest to differences of states (..., n); zero for other states."""
-    found: Array = periods * np.round(apart / np.where(periods > 0, periods, 1.0))
-    return found
+    return periods * np.round(apart / np.where(periods > 0, periods, 1.0))
 
 
 def winding_names(angles: Mapping[str, float]) -> list[str]:

@@ -13,7 +13,6 @@ of one: the derivative of L2 F by z is regular.
 from __future__ import annotations
 
 import dataclasses
-from collections import namedtuple
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -23,6 +22,7 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.iteration import MOST, root
+from contin.functions.signature import named_values
 from contin.levels import CORRECTED
 from contin.problems.own_names import unused
 from contin.problems.vector_field import combined
@@ -96,8 +96,7 @@ class Mass:
 
     def of_states(self, states: Array) -> Array:
         """Return y of states (..., n)."""
-        found: Array = states[..., self.kept] + states[..., self.found] @ np.reshape(self.others, (len(self.kept), -1)).T
-        return found
+        return states[..., self.kept] + states[..., self.found] @ np.reshape(self.others, (len(self.kept), -1)).T
 
     def rates_of(self, field: Function, arguments: int) -> Function:
         """Return the rates of the states that have some, as a function of ``arguments`` arguments: (u, p) or (t, u, p)."""
@@ -118,7 +117,7 @@ class Mass:
         self, function: Function, field: Function, names: Sequence[str], start: Sequence[float], arguments: int
     ) -> Function:
         """Return a function of all states as one of y: z is found from a start such that L2 F = 0, with the field F."""
-        state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
+        state = named_values(tuple(names))
         kept, found, others, algebraic = self.kept, self.found, self.others, self.algebraic
         starts = [float(value) for value in start]
 
@@ -177,8 +176,7 @@ def _independent(matrix: Array) -> list[int]:
 
 def _cleaned(matrix: Array) -> Array:
     """Return a matrix without round-off in the place of zeros."""
-    cleaned: Array = np.where(np.abs(matrix) > CORRECTED * np.abs(matrix).max(axis=1, keepdims=True), matrix, 0.0)
-    return cleaned
+    return np.where(np.abs(matrix) > CORRECTED * np.abs(matrix).max(axis=1, keepdims=True), matrix, 0.0)
 
 
 def _of(function: Callable[..., Any], count: int) -> Function:

@@ -244,14 +244,12 @@ def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]
 
 def multipliers_of(problem: Statement) -> tuple[str, ...]:
     """Return the parameters that are free on every curve of a problem, and need not be named."""
-    names: tuple[str, ...] = getattr(problem, "multipliers", ())
-    return names
+    return getattr(problem, "multipliers", ())
 
 
 def phases_of(problem: Statement) -> tuple[str, ...]:
     """Return the parameters and states of a problem that are zero where its phase conditions hold by symmetry."""
-    names: tuple[str, ...] = getattr(problem, "phases", ())
-    return names
+    return getattr(problem, "phases", ())
 
 
 def check_statement(

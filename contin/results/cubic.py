@@ -21,8 +21,7 @@ def hermite(first: Array, slope: Array, last_slope: Array, last: Array, u: Array
     [0.125]
     """
     chord = last - first
-    found: Array = first + u * (slope + u * (3 * chord - 2 * slope - last_slope + u * (slope + last_slope - 2 * chord)))
-    return found
+    return first + u * (slope + u * (3 * chord - 2 * slope - last_slope + u * (slope + last_slope - 2 * chord)))
 
 
 def through(s: Array, values: Array, rates: Array, parts: int = PARTS) -> Array:

@@ -92,8 +92,7 @@ class PhaseResponse:
         """
         if name not in self.names:
             raise KeyError(f"{name!r} is none of {', '.join(self.names)}")
-        column: Array = self.values[:, self.names.index(name)]
-        return column
+        return self.values[:, self.names.index(name)]
 
     def __call__(self, t: Any) -> Array:
         """Return Z at times (m,), any number of rounds on, shape (m, n); of one time shape (n,)."""

@@ -49,8 +49,7 @@ class Profile:
         """
         if name not in self.names:
             raise KeyError(f"{name!r} is none of {', '.join(self.names)}")
-        column: Array = self.states[:, self.names.index(name)]
-        return column
+        return self.states[:, self.names.index(name)]
 
     def __call__(self, s: Array) -> Array:
         """Return the states at coordinates (m,) between the ends of the segment, shape (m, n).
@@ -66,5 +65,4 @@ class Profile:
         if outside.any():
             ends = f"{exact_text(self.begin)} to {exact_text(self.end)}"
             raise ProblemError(f"s: {exact_text(float(places[outside][0]))} must lie on the segment, from {ends}")
-        states: Array = self._system.evaluate(self._x, t)[:, self._at]
-        return states
+        return self._system.evaluate(self._x, t)[:, self._at]

@@ -66,8 +66,7 @@ def system_of(point: Record, what: str) -> System:
     system: Any = point.system
     if system.on_curve:
         raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
-    found: System = system
-    return found
+    return system
 
 
 def over_t(point: Record, otherwise: str) -> Collocation:
@@ -81,5 +80,4 @@ def over_t(point: Record, otherwise: str) -> Collocation:
     system: Any = point.system
     if not system.is_function_of_t:
         raise ProblemError(otherwise)
-    found: Collocation = system
-    return found
+    return system

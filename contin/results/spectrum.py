@@ -74,8 +74,7 @@ def _values(trial: Any) -> ComplexArray:
 
 def _apart(others: ComplexArray, values: ComplexArray) -> Array:
     """Return how far each value is from the nearest of the others."""
-    found: Array = np.abs(others[:, None] - values).min(axis=0)
-    return found
+    return np.abs(others[:, None] - values).min(axis=0)
 
 
 def _rounded(matrix: Array) -> Any:

@@ -238,8 +238,7 @@ def _system(problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, An
     if not head["curves"]:
         return base
     kind, size = head["curves"][i]
-    found: System = _curves(base)[kind](base, size)
-    return found
+    return _curves(base)[kind](base, size)
 
 
 def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:

@@ -75,8 +75,7 @@ def leaving(start: Point, kind: str, branch: int) -> First:
 def _equilibrium(start: Point) -> tuple[Algebraic, Array]:
     """Return the equilibrium at a point of a curve, in the user's units."""
     curve: Any = start.system
-    found: tuple[Algebraic, Array] = curve.base.without_scales(start.x[: curve.base.size])
-    return found
+    return curve.base.without_scales(start.x[: curve.base.size])
 
 
 def _frequencies(start: Point, base: Algebraic, x: Array) -> list[float]:

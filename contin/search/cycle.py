@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -13,6 +12,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
+from contin.functions.signature import named_values
 from contin.levels import LOCATED, ROUGH
 from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
@@ -103,8 +103,8 @@ Field = Callable[[float, Array], Any]
 
 def _vector_field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
     """Return the field as an integrator of SciPy calls it."""
-    of_state: Any = namedtuple("U", problem.state_names)  # type: ignore[misc]  # noqa: PYI024
-    of_parameters: Any = namedtuple("P", tuple(values))  # type: ignore[misc]  # noqa: PYI024
+    of_state = named_values(problem.state_names)
+    of_parameters = named_values(tuple(values))
     p, field = of_parameters(**values), problem.field
     if problem.period is None:
         return lambda t, u: field(of_state(*u), p)
@@ -157,8 +157,7 @@ def _looks(times: Array, states: Array, periods: Array) -> Array:
     pieces = np.ceil(_PER_ROUND * advance.max(axis=0)).astype(int).clip(1)
     starts = np.repeat(times[:-1], pieces)
     within = np.concatenate([np.arange(count) / count for count in pieces])
-    found: Array = np.append(starts + within * np.repeat(np.diff(times), pieces), times[-1])
-    return found
+    return np.append(starts + within * np.repeat(np.diff(times), pieces), times[-1])
 
 
 def _forced_rounds(
@@ -191,8 +190,7 @@ def _size(states: Array, periods: Array) -> float:
 def _apart(states: Array, start: Array, periods: Array) -> Array:
     """Return differences of states (..., n) from the start, those of angles up to whole rounds."""
     apart = states - start
-    found: Array = apart - whole_rounds(apart, periods)
-    return found
+    return apart - whole_rounds(apart, periods)
 
 
 def _one_round(field: Field, start: Array, longest: float, periods: Array) -> tuple[Array, Array]:

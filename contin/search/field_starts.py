@@ -80,8 +80,7 @@ def oscillation(point: Point, times: int = TIMES) -> tuple[Point, Array]:
     found: Any = problem.discretized([system.free[0], PERIOD], values, None, system.mesh, degree)
 
     def carried(states: Array) -> Array:
-        at_nodes: Array = system.evaluate(system.pack(states, dict.fromkeys(system.free, 0.0)), found.nodes)
-        return at_nodes
+        return system.evaluate(system.pack(states, dict.fromkeys(system.free, 0.0)), found.nodes)
 
     first = found.pack(np.tile(carried(system.states(x)), (1, times)), values)
     wave = carried(vector.real) + 1j * carried(vector.imag)

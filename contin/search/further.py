@@ -340,8 +340,7 @@ def further(
 def _mapped(system: System, each: Symmetry, x: Array) -> Array:
     """Return the image of a solution under a map, which is applied on a uniform mesh."""
     even = evenly(system)
-    mapped: Array = even.carrier(system)(image(even, each, system.carrier(even)(x)))
-    return mapped
+    return even.carrier(system)(image(even, each, system.carrier(even)(x)))
 
 
 def _fitted(system: Any, x: Array) -> Array:

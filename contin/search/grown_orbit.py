@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.newton import nearest_zero
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH
@@ -108,13 +109,9 @@ class _Saddle:
         ConvergenceError
             It is not found.
         """
-        system, rest = self._algebraic({**self.values, self.name: value}), guess.copy()
-        for _ in range(30):
-            update = np.linalg.solve(system.jacobian(rest), system.residual(rest))
-            rest = rest - update
-            if np.abs(update).max() <= 1e-13 * (1 + np.abs(rest).max()):
-                break
-        else:
+        system = self._algebraic({**self.values, self.name: value})
+        rest = nearest_zero(lambda u: (system.residual(u), system.jacobian(u)), guess)
+        if rest is None:
             raise ConvergenceError(f"the equilibrium is not found at {self.name} = {value:.6g}")
         matrix = self.sense * system.jacobian(rest)
         found, vectors = np.linalg.eig(matrix)

@@ -131,8 +131,7 @@ def _of_point(point: Point) -> Guess:
     """Return the states of a point, as a function of t where they are one."""
     system: Any = point.system
     if not system.is_function_of_t:
-        states: Array = system.states(point.x)[0]
-        return states
+        return system.states(point.x)[0]
     return lambda t: system.evaluate(point.x, np.array([t * system.order]))[0]
 
 
@@ -189,8 +188,7 @@ def _continuous(states: Array, periods: Array | None) -> Array:
     if periods is None or not periods.any():
         return states
     jumps = whole_rounds(np.diff(states, axis=0), periods)
-    found: Array = states - np.concatenate([np.zeros((1, states.shape[1])), np.cumsum(jumps, axis=0)])
-    return found
+    return states - np.concatenate([np.zeros((1, states.shape[1])), np.cumsum(jumps, axis=0)])
 
 
 def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[Collocation, Array]:

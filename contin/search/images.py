@@ -49,11 +49,9 @@ def seen(system: Discretization, x: Array) -> Array:
 def evenly(system: Any) -> Discretization:
     """Return a system of a problem, on a uniform mesh if it has one: maps that reverse t take nodes to nodes."""
     if not system.is_function_of_t:
-        found: Discretization = system
-        return found
+        return system
     a, b = system.problem.domain
-    uniform: Discretization = system.on_mesh(np.linspace(a, b, system.intervals + 1))[0]
-    return uniform
+    return system.on_mesh(np.linspace(a, b, system.intervals + 1))[0]
 
 
 def are_one(first: Solution, second: Solution, symmetries: Sequence[Symmetry], tolerance: float) -> bool:

@@ -66,8 +66,7 @@ class Takens:
 
     def _solved(self, right_side: Array) -> Array:
         """Return the v with A v = r and q0.v = 0."""
-        solution: Array = np.linalg.solve(self._bordered, np.append(right_side, 0.0))[:-1]
-        return solution
+        return np.linalg.solve(self._bordered, np.append(right_side, 0.0))[:-1]
 
     def _along(self, v: Array, w: Array) -> Array:
         """Return B(v, w), of directions of the states."""
@@ -119,14 +118,12 @@ class Takens:
     def _at(self, size: float) -> Array:
         """Return the point w = z = 0 of the centre manifold: states and parameters."""
         unfolded = np.array([-4 * size**4, 10 / 7 * self.b * size**2]) / self.a
-        found: Array = self.x + self.linear @ unfolded
-        return found
+        return self.x + self.linear @ unfolded
 
     def _states(self, size: float, w: Array, z: Array) -> Array:
         """Return states on the centre manifold, shape (K, n)."""
         terms = zip((w, z, w * w / 2, w * z, z * z / 2), (*self.q, *self.second))
-        states: Array = self._at(size)[: self.n] + sum(np.outer(factor, vector) for factor, vector in terms)
-        return states
+        return self._at(size)[: self.n] + sum(np.outer(factor, vector) for factor, vector in terms)
 
     def guess(self, size: float) -> tuple[ConnectionCollocation, Array, float]:
         """Return the system of homoclinic orbits, that of this size as unknowns, and its distance from the point."""

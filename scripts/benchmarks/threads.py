@@ -13,7 +13,7 @@ DEMOS = "hen", "log", "cusp", "opt", "plp"
 
 
 def run(quick: bool) -> dict:
-    """Return the processor time in seconds of each demo, in turns: ``free`` with BLAS's own threads, ``one`` with one thread."""
+    """Return the processor time in seconds of each demo: ``free`` with the threads of BLAS, ``one`` with one thread."""
     one, free = environment(), {name: value for name, value in environment().items() if name not in ONE_THREAD}
     found = {}
     for name in DEMOS:

@@ -103,7 +103,7 @@ WELL = (lambda x: x**3 / 3 - x**2 / 2, lambda x: x - x**2)
 WELLS = (lambda x: x**4 / 4 - x**2 / 2, lambda x: x - x**3)
 PENDULUM = (lambda x: -np.cos(x) - 1, lambda x: -np.sin(x))
 LONG = pytest.mark.full
-#: Field, start, first mu, limit, the longest periods, and those from which on the limit is known. Limits of driven pendulums are
+#: Field, start, first mu, limit, the longest periods, and those from which the limit is known. Limits of driven pendulums are
 #: from the unstable manifold of the saddle, integrated (DOP853, 1e-13), that of the neuron from cycles five times as long.
 FAMILIES = [
     pytest.param(_of_a_curve(0.5), [0.67, 0.1], 0.02, 0.0, (10, 15, 25, 60), 25, id="curve"),
