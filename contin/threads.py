@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import functools
 import os
 import threading
@@ -41,15 +42,33 @@ def each(function: Callable[[_Job], _Result], jobs: Sequence[_Job]) -> list[_Res
 
     If calls raise exceptions, that of the first of these jobs is raised, as in a loop.
     """
-    if min(count(), len(jobs)) < 2:
+    threads = min(count(), len(jobs))
+    if threads < 2:
         return [function(job) for job in jobs]
+    found: list[Any] = [None] * len(jobs)
+    failed: dict[int, Exception] = {}
+    left = iter(range(len(jobs)))  # each thread takes the next number
+
+    def work() -> None:
+        for i in left:
+            try:
+                found[i] = function(jobs[i])
+            except Exception as error:
+                failed[i] = error  # all jobs before it were taken
+                collections.deque(left, maxlen=0)  # no more are
+
     with _LOCK:
-        futures = [_pool(count()).submit(function, job) for job in jobs]
+        others = [_pool(count() - 1).submit(work) for _ in range(threads - 1)]
     try:
-        return [future.result() for future in futures]
+        work()
+        for other in others:
+            if not other.cancel():  # all jobs are taken: a thread that has not begun has nothing to do
+                other.result()
     finally:
-        for future in futures:  # of those behind one that failed, none begins
-            future.cancel()
+        collections.deque(left, maxlen=0)
+    if failed:
+        raise failed[min(failed)]
+    return found
 
 
 #: Pools of threads by their size. They live until the process ends or forks.
