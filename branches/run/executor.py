@@ -1,7 +1,7 @@
 """Run independent jobs in processes of this machine or on a Dask cluster; the callers do not know which.
 
-The processes are our own: `concurrent.futures.ProcessPoolExecutor` and loky fail all jobs where one process dies, and cannot end
-a job that takes too long; pebble does, but shares one pipe, which a process killed while it sends blocks for a minute and more.
+The processes are our own: `concurrent.futures.ProcessPoolExecutor` and loky fail all jobs where one process dies, and cannot
+end a job that takes too long. pebble can, but a process that is killed while it sends blocks the others for a minute and more.
 """
 
 from __future__ import annotations
