@@ -18,7 +18,8 @@ from contin import checks
 from contin.arrays import Array, Function, Named
 from contin.boundary.statement import BoundaryValueProblem
 from contin.errors import ProblemError
-from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
+from contin.functions.recording import result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values
 from contin.problems.statement import check_statement, portable
 from contin.problems.vector_field import of_parameters
 from contin.shown import shown

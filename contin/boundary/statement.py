@@ -20,7 +20,8 @@ from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.index import Stability
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
+from contin.functions.recording import result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 

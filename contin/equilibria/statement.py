@@ -19,7 +19,8 @@ from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch
-from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
+from contin.functions.recording import result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values
 from contin.levels import LOCATED
 from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.mass import Mass

@@ -20,7 +20,7 @@ from contin.errors import InterpretedWarning, ProblemError, warn
 from contin.functions import round_off
 from contin.functions.interpreter import Loaded
 from contin.functions.recorded import Request
-from contin.functions.signature import Signature, UserFunction
+from contin.functions.signature import ABSENT, Signature, UserFunction
 
 #: First length of differences, relative to the size of an input, of first and of higher derivatives, which are differences of
 #: differences. Errors of fourth order and of round-off are below 1e-11, or 1e-8, where a function changes over such a size.
@@ -197,7 +197,7 @@ class Interpreted:
 
     def _function_values(self, function: UserFunction, t: Array, x: Array) -> Array:
         if len(x) > 1 and self._takes_arrays(function, t, x):
-            with contextlib.suppress(ArithmeticError, ValueError):  # it has no value at one of the places
+            with contextlib.suppress(*ABSENT):  # it has no value at one of the places
                 return self._at_all(function, t, x)
         return np.array([self._at_one(function, time, place) for time, place in zip(t.tolist(), x)])
 
@@ -231,9 +231,5 @@ class Interpreted:
             if result.size != function.size or result.dtype.kind not in "iufcb":
                 raise ProblemError(f"{function.name} returned {checks.shown(result)}, must be {function.size} numbers")
             return result
-        except ArithmeticError:
+        except ABSENT:
             return np.full(function.size, np.nan)
-        except ValueError as error:
-            if "domain" in str(error):  # that of Python's math
-                return np.full(function.size, np.nan)
-            raise

@@ -48,6 +48,11 @@ class RecordedFunction:
     def __repr__(self) -> str:
         return f"RecordedFunction({self.__name__}({', '.join(self._names)}))"
 
+    @property
+    def count(self) -> int:
+        """Number of values; 0 for one number that is no tuple."""
+        return 0 if self._single else len(self._results)
+
     def __call__(self, *arguments: object) -> Any:
         """Return the value: recorded for recorded numbers, else computed in Python."""
         values = _flat(arguments)

@@ -7,6 +7,8 @@ only where a function does the same each time.
 
 from __future__ import annotations
 
+import contextlib
+import dis
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -15,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Function
 from contin.draws import generator
 from contin.errors import ProblemError
@@ -22,7 +25,7 @@ from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, numbers
 from contin.functions.recorded_complex import ComplexNumber
 from contin.functions.recorded_function import RecordedFunction
-from contin.functions.signature import PROBES, Arguments, Signature, UserFunction, component_count, flat
+from contin.functions.signature import ABSENT, PROBES, Arguments, Signature, UserFunction, component_count, flat, returned
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Tape, Unrecordable
 from contin.levels import LOCATED
@@ -72,14 +75,14 @@ def sized(recording: Recording) -> Recording:
     return Recording(tape, results, time.place, tuple(each.place for each in given))
 
 
-def record(functions: Sequence[UserFunction], signature: Signature) -> Recording:
-    """Return the recording of functions.
+def record(functions: Sequence[UserFunction], signature: Signature, tape: Tape | None = None) -> Recording:
+    """Return the recording of functions, on a new tape or on an empty one.
 
     Raises
     ------
     Unrecordable
     """
-    tape = Tape(NUMPY)
+    tape = tape or Tape(NUMPY)
     time = tape.input(TIME)
     inputs = [tape.input(slot) for slot in range(signature.inputs)]
     given, results = _given(signature, time, inputs), list[int]()
@@ -152,13 +155,13 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
         for place in range(len(taken) - 1, len(before) - 1, -1):
             condition = taken[place][0]
             values = _joined(tape, condition, values, explore([*taken[:place], (condition, False)]))
-        if not values:
-            raise Unrecordable("it has no value on any path")
         return values
 
     before = tape.decide
     try:
-        return explore([])
+        if values := explore([]):
+            return values
+        raise Unrecordable("it has no value on any path")
     finally:
         tape.decide = before
 
@@ -168,7 +171,7 @@ def _joined(tape: Tape, condition: int, values: list[int], others: list[int]) ->
     size = max(len(values), len(others))
     if values and others and len(values) != len(others):
         raise Unrecordable("it does not always return the same number of values")
-    none = [tape.constant(math.nan)] * size
+    none = [tape.constant(math.nan)] * size  # of size 0 without a value on both paths
     return [tape.at("select", (condition, a, b)) for a, b in zip(values or none, others or none)]
 
 
@@ -178,12 +181,20 @@ def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: object) -> l
         return [tape.number(_real(value)).place for value in call(copy)]
     except ProblemError:
         raise
-    except (ArithmeticError, ValueError) as error:
-        if isinstance(error, ValueError) and "domain" not in str(error):
-            raise Unrecordable(_sentence(error)) from error
-        return []
     except Exception as error:  # a user's function may raise anything when it is not given floating-point numbers
+        if isinstance(error, ArithmeticError) or (isinstance(error, ABSENT) and ("domain" in str(error) or _is_stated(error))):
+            return []
         raise Unrecordable(_sentence(error)) from error
+
+
+def _is_stated(error: Exception) -> bool:
+    """Return whether a user's function says itself, by ``raise``, that it has no value: not a library that wants numbers."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if trace is None or "site-packages" in trace.tb_frame.f_code.co_filename:
+        return False
+    return trace.tb_frame.f_code.co_code[trace.tb_lasti] == dis.opmap["RAISE_VARARGS"]
 
 
 def _real(value: object) -> Any:
@@ -222,6 +233,35 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
         scale = 1 + np.abs(expected[known]).max(initial=0.0)
         if np.any(np.abs(computed[known] - expected[known]) > LOCATED * scale):
             raise Unrecordable("its values are not those of its recording")
+
+
+def result_count(function: Function, arguments: Arguments, what: str) -> int:
+    """Return how many values a function returns (0: a bare number), from calls in Python with numbers, or from a recording.
+
+    Raises
+    ------
+    ProblemError
+        The call fails, for each of some numbers, with named tuples and with arrays; ``what`` names the function.
+    """
+    errors: list[Exception] = []
+    for arrays in (False, True):
+        try:
+            return returned(function, arguments, arrays, what)
+        except ProblemError:
+            raise
+        except Exception as error:  # a user's function may raise anything
+            errors.append(error)
+    about_arrays = isinstance(errors[0], TypeError) and not isinstance(errors[1], AttributeError)
+    first = errors[about_arrays]
+    reason = _sentence(first)
+    if isinstance(first, ABSENT):
+        with contextlib.suppress(Unrecordable):
+            return function_of(function, arguments).count
+        tried = checks.listed(f"{number:g}" for number in PROBES[:-1])
+        raise ProblemError(f"{what} has no value at any of the numbers tried ({tried}): it raises {reason!r}") from first
+    if isinstance(first, (AttributeError, KeyError)):
+        reason += "; the states and parameters are " + ", ".join(name for names in arguments for name in names or ())
+    raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
 
 
 def function_of(function: Function, arguments: Arguments) -> RecordedFunction:

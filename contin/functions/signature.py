@@ -180,42 +180,18 @@ class _NoArray(tuple[Any, ...]):
     __add__ = __radd__ = __mul__ = __rmul__ = _refuse
 
 
-def result_count(function: Function, arguments: Arguments, what: str) -> int:
-    """Return how many values a function returns (0: a bare number), from calls in Python with numbers.
-
-    Raises
-    ------
-    ProblemError
-        The call fails, for each of some numbers, with named tuples and with arrays; ``what`` names the function.
-    """
-    errors: list[Exception] = []
-    for arrays in (False, True):
-        try:
-            return _returned(function, arguments, arrays, what)
-        except ProblemError:
-            raise
-        except Exception as error:  # a user's function may raise anything
-            errors.append(error)
-    about_arrays = isinstance(errors[0], TypeError) and not isinstance(errors[1], AttributeError)
-    first = errors[about_arrays]
-    reason = " ".join(str(first).split())
-    if isinstance(first, (AttributeError, KeyError)):
-        reason += "; the states and parameters are " + ", ".join(name for names in arguments for name in names or ())
-    raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
-
-
 def takes_arrays(function: Function, arguments: Arguments) -> bool:
     """Return whether a function has no value for states as named tuples, and has one for states as arrays."""
     for arrays in (False, True):
         try:
-            _returned(function, arguments, arrays, "")
+            returned(function, arguments, arrays, "")
         except Exception:  # noqa: S112  # a user's function may raise anything
             continue
         return arrays
     return False
 
 
-def _returned(function: Function, arguments: Arguments, arrays: bool, what: str) -> int:
+def returned(function: Function, arguments: Arguments, arrays: bool, what: str) -> int:
     """Return how many values a call returns, with states as named tuples or as arrays; parameters, the last, are named."""
     plain = getattr(function, "py_func", function)
     first: Exception | None = None
@@ -224,7 +200,7 @@ def _returned(function: Function, arguments: Arguments, arrays: bool, what: str)
         try:
             with np.errstate(all="ignore"):
                 result = plain(*_grouped(arguments, iter(numbers), np.array, len(arguments) - 1 if arrays else 0))
-        except (ArithmeticError, ValueError) as error:  # it may have values elsewhere
+        except ABSENT as error:  # it may have values elsewhere
             first = first or error
             continue
         if isinstance(result, (dict, set, str)):
@@ -235,6 +211,8 @@ def _returned(function: Function, arguments: Arguments, arrays: bool, what: str)
     raise first
 
 
-#: Numbers with which functions are called to see what they return: in the domain of most functions. NaN, the last, is in the
-#: domain of all, but a search may not end for it.
-PROBES = (0.5, 1.5, -0.5, 0.0, 10.0, math.nan)
+#: Numbers with which functions are called to see what they return: in the domain of most functions, and of tables. NaN, the
+#: last, is in the domain of all, but a search may not end for it.
+PROBES = (0.5, 1.5, -0.5, 0.0, 10.0, 3.0, 30.0, 100.0, 300.0, 1e3, 0.1, 1e4, 1e5, math.nan)
+#: Errors that a function raises where it has no value, such as outside a table.
+ABSENT = (ArithmeticError, ValueError, RuntimeError)

@@ -10,7 +10,8 @@ import numpy as np
 from contin import checks
 from contin.arrays import Function, Named
 from contin.errors import ProblemError
-from contin.functions.signature import Signature, argument_count, named_values, result_count, takes_arrays
+from contin.functions.recording import result_count
+from contin.functions.signature import Signature, argument_count, named_values, takes_arrays
 
 
 def returning(field: Function, signature: Signature) -> Function:
