@@ -84,6 +84,11 @@ class BoundaryEquations(OnMesh):
         u = self._scaled_states(x)
         return _TIME, u[:1], u[-1:], self._scaled_parameters(x)
 
+    def evaluations(self, x: Array) -> list[tuple[Batch, Array, Array, Array, Array]]:
+        """Return right-hand side with integrands, and boundary conditions, in the user's units."""
+        ends = _TIME, self.states(x)[:1], self.states(x)[-1:], self.all_parameters(x)
+        return [(self.problem.batch("field"), *self._inside_unscaled(x)), (self.problem.batch("boundary"), *ends)]
+
     def _both_ends(self, v: Array) -> Array:
         """Return the states at both ends side by side, shape (1, 2 n)."""
         return np.concatenate([v[: self._n], v[self.state_size - self._n : self.state_size]])[None]

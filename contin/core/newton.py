@@ -89,6 +89,8 @@ class Corrected:
         Estimated error left, the largest component relative to 1 + |x|.
     tangent : ndarray, shape (size,), or None
         The unit tangent right at x, where it was asked for and is at hand; the factors are from there, too.
+    singular : bool
+        F_x is singular at x, up to its error.
     """
 
     x: Array
@@ -96,6 +98,7 @@ class Corrected:
     iterations: int
     error: float
     tangent: Array | None = None
+    singular: bool = False
 
     __repr__ = shown
 

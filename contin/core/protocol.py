@@ -103,6 +103,10 @@ class Discretization(Equations, Protocol):
         """Return the same solution with its angles moved by whole rounds, so that they are nearest to those of a reference."""
         return x
 
+    def evaluations(self, x: Array) -> list[tuple[Any, Array, Array, Array, Array]]:
+        """Return the users' functions that F is made of, a `Batch` each, with the t, u, v and p that it is called with at x."""
+        return []
+
     def cut_off_errors(self, x: Array, factors: Factors) -> Array:
         """Return by how much x is off because an infinite interval is cut off, a row for each condition there, (k, size).
 

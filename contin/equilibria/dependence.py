@@ -39,8 +39,8 @@ def dependence(system: AlgebraicEquations, x: Array) -> str:
     if len(places) < PLACES:
         return ""
     matrices = [system.jacobian(place) for place in places]
-    equations = _reduced(_null_vectors(np.hstack(matrices).T))
-    states = _reduced(_null_vectors(np.vstack(matrices)))
+    equations = reduced(_null_vectors(np.hstack(matrices).T))
+    states = reduced(_null_vectors(np.vstack(matrices)))
     return _of_equations(system, places, equations, bool(len(states))) or _of_states(system, states)
 
 
@@ -69,7 +69,7 @@ def conservation_laws(problem: Any) -> Array:
     vectors = _null_vectors(np.hstack(columns).T) if len(columns) > len(_SIZES) else none
     if len(vectors) == n:
         return none  # nothing moves
-    forms = [_reduced(vectors), _reduced(vectors[:, ::-1])[:, ::-1]]
+    forms = [reduced(vectors), reduced(vectors[:, ::-1])[:, ::-1]]
     fewest: Array = min(forms, key=lambda form: np.count_nonzero(form < 0))
     found: Array = np.where(np.abs(fewest - np.rint(fewest)) < LOCATED, np.rint(fewest), fewest)
     return none if any(problem.angles.get(problem.state_names[i]) for i in np.flatnonzero(found.any(axis=0))) else found
@@ -107,7 +107,7 @@ def _null_vectors(matrix: Array) -> Array:
     return vectors[values <= _zero(len(values)) * values[0]] / columns
 
 
-def _reduced(vectors: Array) -> Array:
+def reduced(vectors: Array) -> Array:
     """Return the basis in reduced echelon form, which does not depend on the one given; small numbers are zero."""
     vectors, number = vectors.copy(), 0
     for place in range(vectors.shape[1]):

@@ -110,6 +110,10 @@ class AlgebraicEquations(Spectral, System):
         entries = self._by_unknowns.rows.size
         return self.state_size >= MANY and entries <= _FEW * self.size * self.equations
 
+    def evaluations(self, x: Array) -> list[tuple[Any, Array, Array, Array, Array]]:
+        """Return the residual, in the user's units."""
+        return [(self.problem.batch("residual"), _NO_TIME, self.states(x), self._none, self.all_parameters(x))]
+
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
         given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)

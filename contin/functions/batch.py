@@ -119,7 +119,8 @@ class Batch:
     ) -> None:
         self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
         self.count = sum(max(count, 1) for count in counts)
-        given = [UserFunction(function, self.signature.arguments, count) for function, count in zip(functions, counts)]
+        arguments = self.signature.arguments
+        self.functions = given = [UserFunction(function, arguments, count) for function, count in zip(functions, counts)]
         if not given or len(functions) != len(counts):
             raise ProblemError("functions: there must be at least one, with a count for each")
         self._own: Recorded | Interpreted

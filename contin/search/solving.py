@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -13,7 +13,7 @@ from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.basis import DEGREES
 from contin.collocation.mesh import MOST_INTERVALS, MeshControl
 from contin.continuation.first import ROUNDS_OF_MESHES
-from contin.core.newton import Corrected, Newton, approached, correct
+from contin.core.newton import Corrected, Newton, correct
 from contin.core.settling import ROUNDS
 from contin.core.system import System
 from contin.equilibria.statement import AlgebraicProblem
@@ -24,6 +24,7 @@ from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
 from contin.search.deflation import correct_away
+from contin.search.failure import dependence, doubtful, label_of, looked_at, not_finite_near, recovered
 from contin.search.guess import Guess, Options, first_guess, restated
 
 
@@ -87,7 +88,7 @@ def solve(
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, _degree(problem, guess, control, degree)))
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
-    return solved(system, x, control, newton, others, held)
+    return solved(system, x, control, newton, others, held, explains=True)
 
 
 def _degree(
@@ -103,9 +104,12 @@ def _degree(
 
 
 def solved(
-    system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = (), held: str | None = None
-) -> Point:
+    system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = (), held: str | None = None,
+    explains: bool = False,
+) -> Point:  # fmt: skip
     """Return the solution near a vector of unknowns, on a mesh adapted to it; one of the free parameters may be held.
+
+    With ``explains``, time is taken for a solution at which F_x is singular, and to say why none is found.
 
     Raises
     ------
@@ -113,7 +117,7 @@ def solved(
     """
 
     def corrected(system: System, x: Array) -> Corrected:
-        return _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
+        return _corrected(system, x, others, newton, explains) if held is None else _holding(system, x, held, newton)
 
     for _ in range(ROUNDS_OF_MESHES):
         done = corrected(system, x)
@@ -126,9 +130,10 @@ def solved(
         x = carry(done.x)
     else:
         done = corrected(system, x)
-    _check_determined(system, done.x)
+    _check_determined(system, done, explains)
     system.check_solution(done.x)
-    return point_of(system, done.x, done.iterations, done.error)
+    point = point_of(system, done.x, done.iterations, done.error)
+    return dataclasses.replace(point, label=label_of(system, done.x)) if done.singular else point
 
 
 def _on_switches(system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]) -> tuple[System, Corrected]:
@@ -153,27 +158,28 @@ def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
     return correct(system, x, row, row @ x, newton, sizes=system.magnitudes)
 
 
-def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
+def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton, explains: bool) -> Corrected:
     """Return the solution near x.
 
     Raises
     ------
     ProblemError
-        Newton's method fails at a guess that makes a variational problem singular; the message says why.
+        Newton's method fails, and the equations are singular at the guess, or everywhere; the message says why.
     ConvergenceError
     """
     try:
-        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, sizes=system.magnitudes)
+        if others:
+            return correct_away(system, x, others, newton)
+        done = correct(system, x, newton=newton, sizes=system.magnitudes)
+        return looked_at(system, done) if explains else done
     except ConvergenceError as error:
-        if not others:
-            for place in approached(system, x):
-                with contextlib.suppress(ConvergenceError):
-                    return correct(system, place, newton=newton, sizes=system.magnitudes)
-        if reason := system.degenerate(x):
-            raise ProblemError(reason) from None
+        if not others and (found := recovered(system, x, newton, explains)):
+            return found
+        if why := system.degenerate(x) or (explains and not others and dependence(system, x)):
+            raise ProblemError(why) from None
         if others:
             raise
-        raise ConvergenceError(f"{error}: {_advice(system)}") from None
+        raise ConvergenceError(f"{error}: {(explains and not_finite_near(system, x)) or _advice(system)}") from None
 
 
 def _advice(system: System) -> str:
@@ -188,10 +194,10 @@ def _advice(system: System) -> str:
     )
 
 
-def _check_determined(system: System, x: Array) -> None:
+def _check_determined(system: System, done: Corrected, explains: bool) -> None:
     """Check that a solution does not come with others around it, of which round-off chose one."""
-    if reason := system.undetermined(x):
-        raise ProblemError(reason)
+    if why := system.undetermined(done.x) or (explains and doubtful(system, done)):
+        raise ProblemError(why)
 
 
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:

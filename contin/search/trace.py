@@ -109,6 +109,9 @@ def _first(
         return orbits, x, way * along, False
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
+    if start.label == Label.BRANCH_POINT and start.details is None:  # of `solve`
+        start = _as_branch_point(dataclasses.replace(start, system=system, x=x))
+        x = start.x
     if branch is None or (branch == 0 and not finding_of(start.details).is_branch_point):
         return system, x, _own_tangent(start, system, settings), True
     return system, x, way * _tangent(start, system, branch), True
@@ -150,13 +153,18 @@ def _solution(start: Point, free: Sequence[str] | None) -> tuple[Point, tuple[st
     found = dataclasses.replace(found, x=x, tangent=np.full(x.size, np.nan), system=system)
     if Label.BRANCH_POINT not in (start.label, found.label):
         return found, names
+    return _as_branch_point(found), names
+
+
+def _as_branch_point(found: Point) -> Point:
+    """Return a solution as the branch point that it is, with the branches that leave; itself where it is none."""
     try:
-        point = locate_branch_point(system, x)
+        point = locate_branch_point(found.system, found.x)
     except ConvergenceError:
-        return found, names
-    if not np.abs(point.x - x).max() < APART * (1 + np.abs(x).max()):
-        return found, names  # as at a fold in the other parameter
-    return dataclasses.replace(found, label=Label.BRANCH_POINT, x=point.x, details=point), names
+        return found
+    if not np.abs(point.x - found.x).max() < APART * (1 + np.abs(found.x).max()):
+        return found  # as at a fold in the other parameter
+    return dataclasses.replace(found, label=Label.BRANCH_POINT, x=point.x, details=point)
 
 
 def _own_tangent(start: Point, system: Discretization, settings: Settings) -> Array | None:

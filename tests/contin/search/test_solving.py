@@ -125,7 +125,7 @@ def test_square_roots_of_any_size(a, guess):
         assert a > 1 or guess < math.sqrt(a)
 
 
-@pytest.mark.parametrize("a", [-1e-60, -1e-30, 0.0])
+@pytest.mark.parametrize("a", [-1e-60, -1e-30])
 def test_what_has_no_root_is_not_solved(a):
     problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": a})
     for guess in (1.0, 1e-8, 1e-30):

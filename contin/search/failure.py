@@ -1,0 +1,378 @@
+"""Where Newton's method does not converge from a guess: solutions at which F_x is singular, and the reason otherwise.
+
+In this order:
+
+1. The solution is a fold or a branch point, or so near one that round-off cannot tell. Updates shrink by a factor; the sums of
+   these geometric series get there, until F is round-off.
+2. Damped steps from the guess, or from beside it where F_x is singular or not finite at it, reach a solution.
+3. F or F_x is not finite, at the guess or where the steps end: the operation, its line and the values are named.
+4. F_x is singular everywhere: conditions follow from others, or jumps decide.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin import checks, draws
+from contin.arrays import Array, Indices
+from contin.boundary.statement import BoundaryValueProblem
+from contin.core.labels import Label
+from contin.core.newton import UNITS, Corrected, Newton, approached, correct
+from contin.core.system import System
+from contin.equilibria.dependence import reduced
+from contin.errors import ConvergenceError
+from contin.functions.origin import Place, jump, not_finite
+from contin.levels import APART, CERTAIN, CORRECTED, DEPENDENT, LAST_PLACES, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
+from contin.linalg.border import Bordered, cosine
+from contin.linalg.singular import random_rows
+
+#: Null vectors are looked for among so many, at most: a free beam in space has six.
+_MOST = 8
+#: Updates shrink by a factor between these where F_x is singular at the solution: by 1/2 at a fold, by 2/3 at a pitchfork.
+_FACTORS = (0.3, 0.9)
+#: Largest difference of two such factors, one after the other: with more, their series is not a geometric one yet.
+_STEADY = 0.05
+
+
+def recovered(system: System, x: Array, newton: Newton, singular: bool) -> Corrected | None:
+    """Return a solution that Newton's method does not find from x itself, ``singular`` ones too if wanted; or None."""
+    if singular and (found := _singular_solution(system, x)):
+        return found
+    starts = [x]
+    with np.errstate(all="ignore"):
+        if singular and not np.isfinite(_update(system, x)).all():
+            starts += [place for place in _beside(system, x) if np.isfinite(_update(system, place)).all()][:1]
+    for start in starts:
+        for place in approached(system, start):
+            with contextlib.suppress(ConvergenceError):
+                done = correct(system, place, newton=newton, sizes=system.magnitudes)
+                return looked_at(system, done) if singular else done
+    return None if starts[-1] is x else _singular_solution(system, starts[-1])
+
+
+def looked_at(system: System, done: Corrected) -> Corrected:
+    """Return a solution with the error that round-off leaves where F_x is singular beside it, or where terms of F cancel."""
+    error = _singular_error(system, done.x) if not _response(system, done) < 1 / APART else None
+    if error is None:
+        return done if system.intervals else dataclasses.replace(done, error=max(done.error, _cancelled(system, done)))
+    return dataclasses.replace(done, error=max(error, done.error), singular=True)
+
+
+def _cancelled(system: System, done: Corrected) -> float:
+    """Return up to which distance from a solution, relative to 1 + |x|, updates lead elsewhere: terms of F cancel there."""
+    x, error = done.x, 0.0
+    direction = np.abs(x) * np.sign(random_rows(1, x.size)[0])
+    with np.errstate(all="ignore"):
+        for s in LOCATED * 4.0 ** np.arange(10):
+            steps = s * np.array([direction, -direction])
+            missed = np.abs([done.factors.solve(system.residual(x + step)) - step for step in steps]).max(axis=1)
+            if not missed.min() > np.abs(steps).max() / 2:
+                break
+            error = float(np.max(np.abs(steps[0]) / (1 + np.abs(x))))
+    return error
+
+
+def not_finite_near(system: System, x: Array) -> str:
+    """Return which function has no finite value or derivative at a guess x, or where steps from there lead; "" if none."""
+    where, following = "guess", x
+    with np.errstate(all="ignore"):
+        for _ in range(MOST_UPDATES):
+            if found := _not_finite(system, following):
+                return f"{where}: {found}: give a guess away from there; if the solution lies there, {_advice(found)}"
+            where, following = "steps from the guess lead out of the domain", following - _update(system, following)
+            if not np.isfinite(following).all():
+                break
+    return ""
+
+
+def _advice(found: str) -> str:
+    """Return what to write where a function has no finite value or derivative."""
+    other = "write it in another way, as abs(z) for sqrt(z**2)"
+    return other if "derivative" in found else "write its limit, as np.where(abs(z) > 1e-3, quotient, series)"
+
+
+def doubtful(system: System, done: Corrected) -> str:
+    """Return why a solution is none, as a sentence: conditions follow from others, or the equations are not finite; or ""."""
+    if not system.intervals and (found := _not_finite(system, done.x)):
+        return f"solution: {found}: {_advice(found)}"
+    return dependence(system, done.x) if _is_plain(system) and not _response(system, done) < 1 / DEPENDENT else ""
+
+
+def _response(system: System, done: Corrected) -> float:
+    """Return about the size of the inverse of F_x or, where it is not small, of that times F_x a little aside."""
+    row = random_rows(1, system.size)[0]
+    with np.errstate(all="ignore"):
+        size = float(np.abs(done.factors.solve(row)).max())
+        aside = done.x + ROUGH * (1 + np.abs(done.x)) * np.sign(row)
+        return size if size < 1 / ROUGH else size * float(np.abs(system.transposed_product(aside, row)).max())
+
+
+def label_of(system: System, x: Array) -> str:
+    """Return the label of a solution at which F_x is singular: LP if F bends along the null vector and a parameter moves it.
+
+    BP otherwise: at a transcritical point no parameter moves it, at a pitchfork the even part of F is the smaller one.
+    """
+    rank = _rank(system, x)
+    if rank is None:
+        return ""
+    w, v = rank.left[-1], ROUGH * rank.right[-1] / np.max(np.abs(rank.right[-1]) / (1 + np.abs(x)))
+    ahead, back = (float(w @ system.residual(x + sign * v)) for sign in (1, -1))
+    columns = system.parameter_columns(x, tuple(system.problem.parameters))
+    moves = np.any(np.abs(w @ columns) > LOCATED * (np.abs(w) @ np.abs(columns)))
+    return Label.FOLD if moves and ahead * back > 0 and len(rank.null) < 2 else Label.BRANCH_POINT
+
+
+# --- solutions at which F_x is singular ----------------------------------------------------------------------------------
+
+
+def _singular_solution(system: System, x: Array) -> Corrected | None:
+    """Return the solution near x at which F_x is singular, with the error that round-off leaves; None where there is none."""
+    with np.errstate(all="ignore"):
+        z = _summed(system, x)
+        if not np.isfinite(z).all() or not _is_solution(system, z, x):
+            return None
+        error = _singular_error(system, z)
+        return None if error is None else Corrected(z, system.linearize(z)[1], 0, error, singular=True)
+
+
+def _summed(system: System, x: Array) -> Array:
+    """Return where Newton's method gets from x; where updates shrink by a steady factor, by the sum of all that follow."""
+    before: Array | None = None
+    factor = 0.0
+    for _ in range(MOST_STEPS):
+        update = _update(system, x)
+        if not np.isfinite(update).all():
+            break
+        size = np.abs(update).max(initial=0.0)
+        if before is not None:
+            last, factor = factor, float(update @ before / (before @ before))
+            if size >= np.abs(before).max():
+                break
+            if _FACTORS[0] < factor < _FACTORS[1] and abs(factor - last) < _STEADY:
+                update, factor, size = update / (1 - factor), 0.0, 0.0
+        x, before = x - update, update if size else None
+        if np.all(np.abs(update) <= np.finfo(float).eps * np.abs(x)):
+            break
+    return x
+
+
+def _update(system: System, x: Array) -> Array:
+    residual, factors = system.linearize(x)
+    return factors.solve(residual)
+
+
+def _noise(system: System, x: Array) -> float:
+    """Return by how much the residual changes where x changes by one unit in the last place."""
+    random, residual = draws.generator(__name__), system.residual(x)
+    return max(float(np.abs(system.residual(draws.rounded(random, x)) - residual).max()) for _ in range(draws.DRAWS))
+
+
+def _is_solution(system: System, z: Array, guess: Array) -> bool:
+    """Return whether the residual at z is round-off: of z, or of what it was at the guess."""
+    level = UNITS * _noise(system, z)
+    if system.intervals:  # what acts along t is rounded, too
+        level += LAST_PLACES * float(np.abs(system.residual(guess)).max())
+    return bool(np.isfinite(level) and np.abs(system.residual(z)).max() <= level)
+
+
+def _singular_error(system: System, x: Array) -> float | None:
+    """Return how far round-off of F lets a solution be off where F_x is singular beside it, relative to 1 + |x|; else None.
+
+    Along the null vector F is round-off up to that distance. Beyond it F grows with a power of it: fast if F_x is singular,
+    with the first power only where it is regular. Where F stays round-off, solutions form a curve.
+    """
+    rank = _rank(system, x)
+    if rank is None or _are_many(system, x, rank):
+        return None
+    v, any_way = (d / np.max(np.abs(d) / (1 + np.abs(x))) for d in (rank.right[-1], random_rows(1, x.size)[0]))
+
+    def size(step: Array) -> float:
+        return min(float(np.abs(system.residual(x + sign * step)).max()) for sign in (1, -1))
+
+    with np.errstate(all="ignore"):
+        places = 0.5 ** np.arange(52, 6, -1)
+        sizes, usual = (np.array([size(s * d) for s in places]) for d in (v, any_way))
+        positive = sizes[sizes > 0]
+        level = CERTAIN * max(_noise(system, x), float(np.abs(system.residual(x)).max()), positive[0] if positive.size else 0.0)
+        above = np.flatnonzero((sizes > level) & (sizes > CORRECTED * usual))
+        s = float(places[above[0]]) if above.size else 1.0
+        return s if s < ROUGH and size(4 * s * v) > 8 * size(s * v) else None
+
+
+# --- conditions that follow from others ----------------------------------------------------------------------------------
+
+
+class _Rank(NamedTuple):
+    """Null vectors of F_x as rows, the nearest to one last: ``null`` are the numbers of those that are, up to round-off.
+
+    ``smallest`` is the quotient of the smallest and the largest singular value among them.
+    """
+
+    right: Array
+    left: Array
+    null: Indices
+    smallest: float
+
+
+def _rank(system: System, x: Array) -> _Rank | None:
+    """Return null vectors from borders of F_x that make it regular, one more than there may be null vectors; None if it is not.
+
+    Where A v + b g = 0 with c v = 1 (see `contin.linalg.border`), A v = 0 for combinations of the v that take g to zero.
+    """
+    if system.size != system.equations:
+        return None
+    count = min(len(system.problem.states) + len(system.free) + 1, _MOST, system.size)
+    columns, rows = (np.hstack([random_rows(count, system.size), np.zeros((count, k))]) for k in (0, count))
+    found = Bordered(system.linearize(x, rows, columns)[1], (system.size, system.size), count, count)
+    if not (np.isfinite(found.solutions).all() and np.isfinite(found.transposed).all()):
+        return None
+    left, values, right = np.linalg.svd(found.g.T)
+    null = np.flatnonzero(values <= DEPENDENT * values[0])
+    return _Rank(right @ found.right, left.T @ found.left, null, float(values[-1] / (values[0] or 1.0)))
+
+
+def _nearest(system: System, x: Array, rank: _Rank) -> Array:
+    """Return the point that Newton's method reaches from x with the null vectors of F_x held, up to which F can be solved."""
+    right, left = rank.right[rank.null], rank.left[rank.null]
+    right, left = (rows / np.linalg.norm(rows, axis=1, keepdims=True) for rows in (right, left))
+    for _ in range(MOST_UPDATES):
+        rows = np.hstack([right, np.zeros((len(right), len(left)))])
+        residual, factors = system.linearize(x, rows, left)
+        update = factors.solve(np.append(residual, np.zeros(len(rows))))[: system.size]
+        if not np.isfinite(update).all():
+            break
+        x = x - update
+        if np.abs(update).max() <= LAST_PLACES * (1 + np.abs(x).max()):
+            break
+    return x
+
+
+def _are_many(system: System, x: Array, rank: _Rank) -> bool:
+    """Return whether a solution x is one of a curve of solutions: others are reached from beside it."""
+    if not rank.null.size:
+        return False
+    v = rank.right[rank.null].sum(axis=0)
+    aside = x + ROUGH * v / np.max(np.abs(v) / (1 + np.abs(x)))
+    z = _nearest(system, aside, rank)
+    return bool(np.max(np.abs(z - x) / (1 + np.abs(x))) > ROUGH / 2) and _is_solution(system, z, aside)
+
+
+def _beside(system: System, x: Array) -> Iterator[Array]:
+    """Return places around x."""
+    random = draws.generator(__name__)
+    for sign in np.repeat((1.0, -1.0), draws.PLACES):
+        yield x + sign * draws.ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
+
+
+def _is_plain(system: System) -> bool:
+    """Return whether the problem is a boundary value problem and no special kind of it."""
+    return type(system.problem) is BoundaryValueProblem
+
+
+def dependence(system: System, x: Array) -> str:
+    """Return which conditions of a boundary value problem follow from others or contradict them, as a sentence; or ""."""
+    rank = _rank(system, x) if _is_plain(system) else None
+    if rank is None:
+        return ""
+    if not rank.null.size:
+        return _phase(system, x)
+    z = _nearest(system, x, rank)
+    solved = bool(np.isfinite(z).all()) and _is_solution(system, z, x)
+    rank = (_rank(system, z) if solved else _rank(system, next(_beside(system, x)))) or rank
+    if not rank.null.size or (solved and not _are_many(system, z, rank)):
+        return ""
+    return _jumping(system, rank) or _conditions(system, z, rank, solved)
+
+
+def _jumping(system: System, rank: _Rank) -> str:
+    """Return which states act by jumps only, as a sentence; "" if none."""
+    if not (switch := jump(system.problem.batch("field"), _moved(system, rank)[1])):
+        return ""
+    text, one = _named(system, rank)
+    return (
+        f"rhs: {text} {'acts' if one else 'act'} by a jump only ({switch}), whose derivative is zero, so that Newton's method "
+        "does not see it: write it as a smooth step with a parameter eps, such as tanh(z / eps) for sign(z), solve at a large "
+        "eps, and follow the solution to a small one (trace)"
+    )
+
+
+def _conditions(system: System, z: Array, rank: _Rank, solved: bool) -> str:
+    """Return which conditions follow from the others, or contradict them, and what to put in their place."""
+    problem: Any = system.problem
+    counts = {"boundary": problem.boundary_size, "integral": problem.integral_size}
+    numbered = [f"{kind} condition {i + 1}" for kind, count in counts.items() for i in range(count)]
+    left, (moved, _), (text, is_one) = rank.left[rank.null], _moved(system, rank), _named(system, rank)
+    rows = reduced(left[:, system.equations - len(numbered) :][:, ::-1])[:, ::-1]
+    extra = checks.listed(sorted(numbered[np.flatnonzero(row)[-1]] for row in rows))
+    places = [f"{name} at the {end} end" for end in ("first", "second") for name in problem.state_names] + list(system.free)
+    ends = reduced(np.hstack([moved[:, 0], moved[:, -1], rank.right[rank.null, system.state_size :]]))
+    held = "conditions on " * (len(ends) > 1) + checks.listed(places[np.flatnonzero(row)[0]] for row in ends if row.any())
+    held, verb, their = (held, "", "their") if len(ends) > 1 else (f"a condition on {held}", "s", "its")
+    if solved and _is_shift(system, z, moved):
+        return (
+            f"boundary: {text} may be shifted along t, as nothing holds the phase: state a cycle as a CycleProblem, which finds"
+            f" its period; or put {held} in the place of {extra}"
+        )
+    free_ones = f"{text} {'is' if is_one else 'are'} not determined"
+    if solved:
+        return f"boundary: {extra} follow{verb} from the others and the equations, and {free_ones}: put {held} in {their} place"
+    others = [name for name in problem.parameters if name not in system.free]
+    columns = system.parameter_columns(z, others)
+    changing = np.any(np.abs(left @ columns) > LOCATED * (np.abs(left) @ np.abs(columns)), axis=0).tolist()
+    freed = [name for name, may in zip(others, changing) if may][: len(ends)]
+    advice = f", or add it and free {checks.listed(freed)}" if len(freed) == len(ends) == 1 else ""
+    return (
+        f"boundary: {extra} contradict{verb} the others and the equations, so there is no solution at these parameters, and "
+        f"{free_ones}: put {held} in {their} place{advice}"
+    )
+
+
+def _phase(system: System, x: Array) -> str:
+    """Return that only a phase and a period are missing, of periodic boundary conditions near a cycle, as a sentence; or ""."""
+    with np.errstate(all="ignore"):
+        z = _summed(system, x)
+        rank = _rank(system, z) if np.isfinite(z).all() else None
+        if rank is None or rank.smallest > ROUGH:
+            return ""
+        if not _is_shift(system, z, _moved(system, rank._replace(null=np.array([-1])))[0], ROUGH):
+            return ""
+    return (
+        "boundary: the solution nearby may be shifted along t, as nothing holds its phase, and has its own period: state a "
+        "cycle as a CycleProblem, which finds its period; or free a parameter and add a condition for the phase"
+    )
+
+
+def _moved(system: System, rank: _Rank) -> tuple[Array, list[int]]:
+    """Return the null vectors at the nodes, shape (k, K, n), and the states that they move."""
+    moved = rank.right[rank.null, : system.state_size].reshape(len(rank.null), -1, len(system.problem.states))
+    sizes = np.abs(moved).max(axis=(0, 1))
+    return moved, np.flatnonzero(sizes > LOCATED * sizes.max()).tolist()
+
+
+def _named(system: System, rank: _Rank) -> tuple[str, bool]:
+    """Return the names of these states, and whether it is one."""
+    states = _moved(system, rank)[1]
+    return checks.listed(system.problem.states[i] for i in states), len(states) == 1
+
+
+def _is_shift(system: System, z: Array, moved: Array, level: float = APART) -> bool:
+    """Return whether the null vector is the derivative of the solution by t."""
+    given = system.nodes, system.states(z), moved[0, :0], system.all_parameters(z)
+    rates = system.problem.batch("field").values(*given)[:, : moved.shape[2]]
+    return len(moved) == 1 and bool(cosine(rates.ravel(), moved.ravel()) > 1 - level)
+
+
+def _not_finite(system: System, x: Array) -> str:
+    """Return where a function has no finite value or derivative at x, as a sentence; "" where all have."""
+    with np.errstate(all="ignore"):
+        for batch, times, u, v, p in system.evaluations(x):
+            values, slopes = batch.jacobian(times, u, v, p, batch.columns(()))
+            finite = np.isfinite(values).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
+            for i in np.flatnonzero(~finite)[:1]:
+                return not_finite(Place(batch, float(times[i]), [*u[i], *(v[i] if len(v) else ()), *p]))
+    return ""
