@@ -69,11 +69,11 @@ def _cancelled(system: System, done: Corrected) -> float:
     direction = np.abs(x) * np.sign(random_rows(1, x.size)[0])
     with np.errstate(all="ignore"):
         for s in LOCATED * 4.0 ** np.arange(10):
-            steps = s * np.array([direction, -direction])
-            missed = np.abs([done.factors.solve(system.residual(x + step)) - step for step in steps]).max(axis=1)
-            if not missed.min() > np.abs(steps).max() / 2:
+            steps = s * direction, -s * direction
+            missed = (np.abs(done.factors.solve(system.residual(x + step)) - step).max() for step in steps)
+            if not all(size > s * np.abs(x).max() / 2 for size in missed):
                 break
-            error = float(np.max(np.abs(steps[0]) / (1 + np.abs(x))))
+            error = s * float(np.max(np.abs(x) / (1 + np.abs(x))))
     return error
 
 
@@ -98,7 +98,7 @@ def _advice(found: str) -> str:
 
 def doubtful(system: System, done: Corrected) -> str:
     """Return why a solution is none, as a sentence: conditions follow from others, or the equations are not finite; or ""."""
-    if not system.intervals and (found := _not_finite(system, done.x)):
+    if not np.isfinite(system.residual(done.x)).all() and (found := _not_finite(system, done.x)):
         return f"solution: {found}: {_advice(found)}"
     return dependence(system, done.x) if _is_plain(system) and not _response(system, done) < 1 / DEPENDENT else ""
 
