@@ -33,7 +33,7 @@ def fans(network: Network) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fa
         A pressure on the network has no potential.
     """
     found: dict[str, Fan] = {}
-    slides = []
+    slides: list[tuple[JointEnd, str, Fan]] = []
     for name in network.members:
         if name not in found:
             row, closed = _row(network, name)
@@ -42,12 +42,13 @@ def fans(network: Network) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fa
             arms = places - places[0]  # a straight line between both ends closes the area
             area = float(np.cross(arms[:-1], arms[1:]).sum(axis=0) @ network.pressure_normal)
             turn = -1 if area < -LOOSE * np.ptp(places, axis=0).max() ** 2 else 1
-            centre = (0.0, 0.0, 0.0) if closed else numbers_of((places[0] + places[-1]) / 2)
+            outer = [JointEnd(other, FINISH if way == sign else START) for way, (other, sign) in ((-1, row[0]), (1, row[-1]))]
+            sliding = [not closed and _slides(network, each) for each in outer]
+            fixed = [place for place, slide in zip(places[[0, -1]], sliding) if not slide] or places[[0, -1]]
+            centre = (0.0, 0.0, 0.0) if closed else numbers_of(np.mean(fixed, axis=0))
             found |= {other: (turn * sign, centre) for other, sign in row}
-            for way, (other, sign) in zip((-1, 1), () if closed else (row[0], row[-1])):
-                each = JointEnd(other, FINISH if way == sign else START)
-                if _slides(network, each):
-                    slides.append((each, network.joint_at(each), (turn * way, centre)))
+            ends = zip(outer, (-1, 1), sliding)
+            slides += [(each, network.joint_at(each), (turn * way, centre)) for each, way, slide in ends if slide]
     return found, slides
 
 
