@@ -1,0 +1,220 @@
+"""Networks are the same wherever they stand, and however they are drawn: turned, moved, with strips drawn from their other end,
+in another order, under other names, cut. Labelled points, their values, index, places and reactions are compared.
+"""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from branches.read import read_branch
+from branches.run.display import Display
+from branches.run.runner import run_scene
+from branches.scene.fields import ConfigError
+from branches.scene.parse import parse
+from ribbon_model.equilibrium import directors
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+TURN, SHIFT = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix(), np.array([1.5, -4.0, 2.5])
+CHANGES = ("all", "turned", "moved", "against", "order", "names", "cut")
+
+
+class _Plain(yaml.SafeDumper):
+    """A scene has no aliases."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
+class Redrawn:
+    """A scene as fields, redrawn: what each change does to strips, joints, supports and loads."""
+
+    def __init__(self, fields: dict, change: str):
+        self.scene, self.fields = parse(yaml.dump(fields, Dumper=_Plain), "scene.yaml"), fields
+        does = {one for one in CHANGES[1:] if change in ("all", one)}
+        self.turn = TURN if "turned" in does else np.eye(3)
+        self.shift = SHIFT if "moved" in does else np.zeros(3)
+        self.order = -1 if "order" in does else 1
+        self.joint, self.strip = ("j_{}", "t_{}") if "names" in does else ("{}", "{}")
+        self.against = set(list(fields["strips"])[::2]) if "against" in does else set()
+        self.cut = next(iter(fields["strips"])) if "cut" in does else None
+
+    def vector(self, values) -> list[float]:
+        return (self.turn @ np.array(values, dtype=float)).tolist()
+
+    def place(self, words: str) -> str:
+        name, _, where = words.partition(" ")
+        if name in self.against:
+            at = where.removeprefix("at ")
+            where = {"start": "finish", "finish": "start"}.get(where) or f"at {1 - float(at):.12g}"
+        return f"{self.strip.format(name)} {where}"
+
+    def strips(self) -> dict:
+        found = {}
+        for name, member in list(self.scene._drawn.items())[:: self.order]:
+            state = member.drawn([member.length if name in self.against else 0.0])[0]
+            _, normal, tangent = np.reshape(directors(*state[:4]), (3, 3))
+            bend, _, twist = member.strains
+            found[self.strip.format(name)] = {
+                "begin": (self.turn @ state[4:] + self.shift).tolist(), "normal": self.vector(normal), "length": member.length,
+                "along": self.vector(-tangent if name in self.against else tangent), "bend": bend * member.length,
+                "twist": twist * member.length, **({"section": member.section} if "sections" in self.fields else {}),
+            }  # fmt: skip
+        return found
+
+    def joints(self) -> dict:
+        found = {}
+        for name, joint in list(self.fields["joints"].items())[:: self.order]:
+            given = dict(joint) if isinstance(joint, dict) else {"strips": joint}
+            changed = {"strips": [self.place(one) for one in given["strips"]]}
+            for part in ("angle", "arm"):
+                for place, value in given.get(part, {}).items():
+                    flip = np.array([-1, 1, -1]) if place.split()[0] in self.against and part == "arm" else 1
+                    value = (flip * np.array(value)).tolist() if part == "arm" else value
+                    changed.setdefault(part, {})[self.place(place)] = value
+            if "angle" in given:
+                about = self.scene.joints[name].about
+                changed["about"] = self.vector(self.scene.axes_at(name).get(about, about))
+            changed |= {"hinge": self.vector(given["hinge"])} if "hinge" in given else {}
+            found[self.joint.format(name)] = changed | ({"ball": True} if given.get("ball") else {})
+        if self.cut:
+            found["cut"] = [f"{self.strip.format(self.cut)} at 0.37"]
+        return found
+
+    def held(self, given: dict) -> dict:
+        vectors = ("about", "slides_along", "slides_in_plane")
+        return {
+            self.joint.format(name): end if isinstance(end, str) else
+            {field: self.vector(value) if field in vectors else value for field, value in end.items()}
+            for name, end in given.items()
+        }  # fmt: skip
+
+    def loads(self) -> dict:
+        def acting(action):
+            if isinstance(action, list):
+                return self.vector(action)
+            return {field: self.vector(value) if field in ("force", "arm") else value for field, value in action.items()}
+
+        return {
+            number: {
+                self.joint.format(at) if at in self.fields["joints"] else self.place(at): acting(one) for at, one in of.items()
+            }
+            for number, of in self.fields.get("loads", {}).items()
+        }
+
+    def changed(self) -> dict:
+        directions = {name: self.vector(value) for name, value in self.scene.directions.model_dump().items()}
+        return self.fields | {
+            "strips": self.strips(), "joints": self.joints(), "held": self.held(self.fields.get("held", {})),
+            "loads": self.loads(), "directions": directions,
+        }  # fmt: skip
+
+
+def _result(fields: dict, path: Path):
+    """The result of a scene, or why it has no first state."""
+    try:
+        run_scene(parse(yaml.dump(fields, Dumper=_Plain), "scene.yaml"), path, Display(silent=True), overwrite=True)
+    except ConfigError as error:
+        return str(error)
+    return read_branch(path)
+
+
+def _compare(fields: dict, change: str, folder: Path, first=None) -> None:
+    redrawn = Redrawn(fields, change)
+    one = _result(fields, folder / "one.h5") if first is None else first
+    other = _result(redrawn.changed(), folder / "other.h5")
+    if isinstance(one, str):  # both can move, or forces are undetermined in both
+        assert isinstance(other, str) and one.partition("energy")[2] == other.partition("energy")[2]
+        return
+    assert not isinstance(other, str), other
+    a, b = one.events, other.events
+    assert a["label"].tolist() == b["label"].tolist()
+    for name in ("index_before", "index_after", "kernel", "stage", "index"):
+        assert a[name].tolist() == b[name].tolist(), name
+    for name in dict.fromkeys(stage["follow"] for stage in fields["stages"]):
+        size = 1 + np.abs(a[name]).max()
+        np.testing.assert_allclose(b[name], a[name], rtol=0, atol=1e-8 * size, err_msg=name)
+    forces = 1 + max((np.abs(a[name]).max() for name in a.dtype.names if name[:2] in ("F_", "M_")), default=0.0)
+    if "weight" not in a.dtype.names:  # whose potential is zero at the origin
+        np.testing.assert_allclose(b["energy"], a["energy"], rtol=0, atol=1e-7 * (1 + np.abs(a["energy"]).max()))
+    if "floating" in a.dtype.names:  # which is held at the first end of its first strip
+        assert max(a["floating"].max(), b["floating"].max()) < 1e-7
+        return
+    for name in one.scene.joints:
+
+        def vectors(table, name, before=""):
+            return np.array([table[f"{before}{name}_{axis}"] for axis in "xyz"]).T
+
+        there = redrawn.joint.format(name)
+        np.testing.assert_allclose(vectors(b, there), vectors(a, name) @ redrawn.turn.T + redrawn.shift, rtol=0, atol=1e-7)
+        for kind in ("F_", "M_") if name in one.scene.held else ():
+            np.testing.assert_allclose(
+                vectors(b, there, kind),
+                vectors(a, name, kind) @ redrawn.turn.T,
+                rtol=0,
+                atol=1e-7 * forces,
+                err_msg=kind + name,
+            )
+
+
+@functools.cache
+def _shipped(name: str) -> dict:
+    """The fields of a shipped scene, up to the first stage that leaves a branch point: to either side, as its mode is drawn."""
+    fields = yaml.safe_load((CONFIGS / f"{name}.yaml").read_text("utf-8"))
+    leaves = [number for number, stage in enumerate(fields["stages"]) if str(stage.get("start_at", "")).startswith("BP")]
+    return fields | {"stages": fields["stages"][: leaves[0] if leaves else None]}
+
+
+NAMES = sorted(path.stem for path in CONFIGS.glob("network_*.yaml"))
+#: Tried by default, as it is short.
+QUICK = ("network_weight",)
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in NAMES]
+)  # fmt: skip
+@pytest.mark.parametrize("change", [one if one == "all" else pytest.param(one, marks=pytest.mark.full) for one in CHANGES])
+def test_shipped_networks_are_the_same_however_they_are_drawn(name, change, tmp_path):
+    _compare(_shipped(name), change, tmp_path)
+
+
+def _random(seed: int) -> dict:
+    """Strips in a row, a ring or a tree, with joints of all kinds, supports and a load in any direction."""
+    rng = np.random.default_rng(seed)
+
+    def vector(size=1.0):
+        return (size * rng.standard_normal(3)).round(3).tolist()
+
+    kind, count = ("row", "ring", "tree")[seed % 3], int(rng.integers(2, 4))
+    places = [vector() for _ in range(count + (kind != "ring"))]
+    far = {"row": lambda i: i + 1, "ring": lambda i: (i + 1) % count, "tree": lambda i: i + 1}[kind]
+    near = {"row": lambda i: i, "ring": lambda i: i, "tree": lambda i: int(rng.integers(i + 1))}[kind]
+    pairs = [(near(i), far(i)) for i in range(count)] + ([(0, 1)] if kind == "ring" and count == 2 else [])
+    pairs = pairs[:1] if kind == "ring" and count == 2 else pairs
+    strips = {f"s{i}": {"begin": places[a], "end": places[b], "normal": vector()} for i, (a, b) in enumerate(pairs)}
+    at: dict[int, list[str]] = {}
+    for i, (a, b) in enumerate(pairs):
+        at.setdefault(a, []).append(f"s{i} start")
+        at.setdefault(b, []).append(f"s{i} finish")
+    joints = {}
+    for number, ends in at.items():
+        more = [{}, {}, {}, {"hinge": vector()}, {"ball": True}][int(rng.integers(5))] if len(ends) > 1 else {}
+        joints[f"J{number}"] = {"strips": ends, **more}
+    support = ["clamped"] * 2 + ["hinged"] + [{"rotation": "hinged", "about": vector()}, {"slides_along": vector()}]
+    held = {name: support[int(rng.integers(5))] for name in (["J0", f"J{max(at)}"] if kind != "tree" else ["J0"])}
+    loads = {"P": {f"s{int(rng.integers(len(strips)))} at 0.6": {"force": vector(), "follows": seed % 7 == 3}}}
+    stiffness = dict(zip(("B1", "B2", "C"), rng.uniform(0.5, 3, 3).round(3).tolist()))
+    return {
+        "material": {"law": "rod", **stiffness, "kappa_n": round(float(rng.uniform(-1, 1)), 3), "tau_n": 0.2},
+        "strips": strips, "joints": joints, "held": held, "loads": loads, "numbers": {"weight": 0.5} if seed % 2 else {},
+        "stages": [{"follow": "P", "to": 0.3}],
+    }  # fmt: skip
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", [1, 0, *range(2, 30)])
+def test_random_networks_are_the_same_however_they_are_drawn(seed, tmp_path):
+    _compare(_random(seed), "all", tmp_path)
