@@ -183,6 +183,18 @@ def test_a_point_without_an_error_of_its_place_has_none_of_its_forces():
     assert all(math.isnan(error) for error in errors_of(lost, strip.reactions).values())
 
 
+def test_what_newtons_method_left_counts_by_size():
+    """A straight strip under tension, 2: relative to 1 + |value|, and once more to the largest force or moment."""
+    stages = "stages: [{follow: force_width, to: 1}]\n"
+    config = parse(f"material: {{law: flat rod, nu: 0.3}}\nfinish: free\nnumbers: {{force_tangent: 2}}\n{stages}", "s")
+    first, strip = first_state(config), config.strip()
+    point = contin.lowlevel.point_of(*first.system.with_free(("force_width", *strip.problem.multipliers), first.x))
+    for left in (0.0, 1e-6):
+        errors = errors_of(dataclasses.replace(point, newton_error=left, errors={"force_width": 0.0}), strip.reactions)
+        for name, forces in {"start_F_width": 2, "start_F_tangent": 2 + 2, "start_M_width": 0, "start_M_tangent": 0}.items():
+            assert errors[name] == pytest.approx(left * (1 + forces), abs=1e-12)
+
+
 def test_the_summary_shows_the_errors(tmp_path, capsys):
     scene = f"material: {{}}\ndimensions: {DIMENSIONS}\nnumbers: {{distance: 0.39}}\nbegin: arch\n"
     text = f"{scene}stages: [{{follow: distance, to: 0.3}}]\n"

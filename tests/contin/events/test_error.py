@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 import contin
 from contin import ProblemError
+from contin.lowlevel import levels
 
 
 @functools.cache
@@ -51,6 +52,14 @@ def test_a_located_place_counts():
     assert point.error("x") < 1e-10
     rough = dataclasses.replace(point, errors={"a": 1e-3})
     assert rough.error("x") == pytest.approx(4e-3, rel=1e-4)
+
+
+def test_what_newtons_method_left_counts_once():
+    """Relative to 1 + |x|; a point at which nothing is left is known to the last places. The true error is below them."""
+    point = contin.solve(contin.AlgebraicProblem(lambda u, p: (u.x - p.a**2,), ["x"], {"a": 2.0}), [4.1])
+    for left in (0.0, 1e-6):
+        error = dataclasses.replace(point, newton_error=left).error("x")
+        assert error == pytest.approx((left + levels.LAST_PLACES) * (1 + 4), rel=1e-12)
 
 
 def test_a_branch_point():
