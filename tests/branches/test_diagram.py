@@ -121,10 +121,24 @@ def _guesses(m, n, kappa_n):
     return [points[i] for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
 
 
-def test_folds_in_a_window(folder):
+@pytest.fixture(scope="module")
+def known():
+    """The folds of the diagram by the quadrature."""
+    return sorted(p.kappa_n for m, n in ((1, 2), (1, 3), (3, 4)) for p in exact.folds(m, n, 0.3))
+
+
+def test_folds_in_a_window(folder, known):
     found = diagram.folds(read(folder), -8, 14)
-    expected = [p.kappa_n for m, n in ((1, 2), (1, 3), (3, 4)) for p in exact.folds(m, n, 0.3)]
-    assert [node["kappa_n"] for node in found] == pytest.approx(sorted(k for k in expected if -8 < k < 14), abs=1e-9)
+    assert [node["kappa_n"] for node in found] == pytest.approx([k for k in known if -8 < k < 14], abs=1e-9)
+
+
+@pytest.mark.parametrize("outside", [0, 1])
+def test_the_ends_of_a_window_of_folds(folder, known, outside):
+    """Folds 1e-8 inside or outside both ends; their places are those of the quadrature, known to 1e-9."""
+    margin = -1e-8 if outside else 1e-8
+    found = diagram.folds(read(folder), known[1] - margin, known[-2] + margin)
+    inside = known[1 + outside : len(known) - 1 - outside]
+    assert [node["kappa_n"] for node in found] == pytest.approx(inside, abs=1e-9)
 
 
 def test_folds_are_listed_with_their_branches(folder, call):

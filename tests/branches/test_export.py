@@ -80,8 +80,15 @@ def test_a_glb_holds_the_surface_upright(write):
     assert data[:4] == b"glTF" and struct.unpack("<I", data[8:12])[0] == len(data)
     told = json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
     assert told["materials"][0]["doubleSided"]
-    stl = trimesh.load_mesh(write("strip.stl", "--width", WIDTH))
-    np.testing.assert_allclose(written.extents, stl.extents[[0, 2, 1]], rtol=1e-5)  # the second axis of glTF is up
+
+
+def test_a_glb_is_turned_and_not_mirrored(write):
+    """The second axis of glTF is up: (x, y, z) becomes (x, z, -y). Faces look outward, as those of the STL file do."""
+    trimesh = pytest.importorskip("trimesh")
+    written, stl = (trimesh.load_mesh(write(f"solid.{ending}", *SOLID)) for ending in ("glb", "stl"))
+    assert written.volume == pytest.approx(WIDTH * THICKNESS, rel=DISCRETIZED)  # negative for a mirrored solid
+    turned = stl.triangles[..., [0, 2, 1]] * [1, 1, -1]
+    np.testing.assert_allclose(np.sort(written.triangles_center, axis=0), np.sort(turned.mean(axis=1), axis=0), atol=1e-6)
 
 
 def test_a_gltf_is_one_file(write):
