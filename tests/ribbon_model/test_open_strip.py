@@ -114,6 +114,26 @@ LATERAL = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("load, place, stiffness", [("force_width", "shear", 4.0), ("force_normal", "rise", 1.0)])
+@pytest.mark.parametrize("tension", [0.0, 2.0, -1.0])
+def test_the_tip_of_a_cantilever_goes_where_a_small_force_pulls(load, place, stiffness, tension):
+    """P/3 B (L = 1); with a tension T = B k**2 also P (1 - tanh(k)/k)/T, for thrust with tan (Timoshenko & Gere, ch. 1).
+
+    Terms of higher order are P**2 = 1e-10 times as large.
+    """
+    k = math.sqrt(abs(tension) / stiffness)
+    expected = 1e-5 * ((1 - (math.tanh if tension > 0 else math.tan)(k) / k) / tension if tension else 1 / (3 * stiffness))
+    tip = OpenStrip(ROD, CLAMP, FREE_END, {load: 1e-5, "force_tangent": tension}).first_point()
+    assert math.isclose(tip[place], expected, rel_tol=1e-8)
+
+
+@pytest.mark.parametrize("load, size", [("weight", 1 / 8), ("moment", -1 / 2)])
+def test_the_tip_of_a_cantilever_goes_where_weight_and_moment_bend_it(load, size):
+    """w/8 B to where the weight pulls, M/2 B where a right-handed turn about d1 takes d3: to -d2 (Timoshenko & Gere, ch. 1)."""
+    strip = OpenStrip(ROD, CLAMP, hinge(held=()), {load: 1e-5}, weight_direction=NORMAL)
+    assert math.isclose(strip.first_point()["rise"], size * 1e-5, rel_tol=1e-8)
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("law", LATERAL)
 def test_a_cantilever_buckles_sideways(law):
