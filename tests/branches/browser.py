@@ -1,6 +1,7 @@
-"""A headless Chromium, for tests of pages."""
+"""A headless Chromium, for tests of pages; and their scripts alone, in Node where it is installed."""
 
 import base64
+import html
 import json
 import shutil
 import subprocess
@@ -9,11 +10,26 @@ import urllib.request
 
 import numpy as np
 
+NODE = shutil.which("node")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 _FLAGS = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-port=0",
 )  # fmt: skip
+
+
+def evaluated(scripts, expression, folder):
+    """Return the value of an expression that these scripts can compute without a page."""
+    program = "\n".join((*scripts, f"const evaluated = JSON.stringify({expression});"))
+    if NODE:
+        command, program = [NODE, "-"], f"{program}\nconsole.log(evaluated);"
+    else:
+        page = folder / "page.html"
+        shown = "document.querySelector('pre').textContent = evaluated;"
+        page.write_text(f"<pre></pre><script>{program}\n{shown}</script>", encoding="utf-8")
+        command = [CHROMIUM, *_FLAGS[:-1], f"--user-data-dir={folder / 'profile'}", "--dump-dom", page.as_uri()]
+    done = subprocess.run(command, input=program, capture_output=True, encoding="utf-8", timeout=60, check=True).stdout
+    return json.loads(done if NODE else html.unescape(done.partition("<pre>")[2].partition("</pre>")[0]))
 
 
 class Browser:
