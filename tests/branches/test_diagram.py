@@ -5,11 +5,13 @@ import itertools
 import json
 import multiprocessing.connection
 import os
+import shutil
 import signal
 import sys
 import time
 from concurrent.futures import Future
 
+import h5py
 import networkx
 import numpy as np
 import pytest
@@ -68,6 +70,16 @@ def test_folds_and_ends_are_those_of_the_quadrature(folder):
             assert last["kind"] == "leaves" and last["kappa_n"] == pytest.approx(-60, abs=1e-9)
         else:
             assert (last["covering"], last["kappa_n"]) == (end[0], pytest.approx(end[1], abs=1e-8))
+
+
+def test_an_unfinished_branch_of_a_folder_is_computed_again(folder, tmp_path):
+    """A single run that was killed leaves such a file; a diagram's own branches are written when they are complete."""
+    again = shutil.copytree(folder, tmp_path / "again")
+    path = min(again.glob("*.h5"), key=lambda path: path.stat().st_size)
+    with h5py.File(path, "r+") as file:
+        file.attrs["status"] = "running"
+    assert run_many(parse(SCENE, "scene"), again, Display(silent=True)) == "complete"
+    assert read_branch(path).status == "complete"
 
 
 def test_where_does_a_branch_go_from_either_end(folder):

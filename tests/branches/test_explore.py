@@ -40,6 +40,23 @@ SVG = "{http://www.w3.org/2000/svg}"
 LAWS = "{law: [ribbon, flat rod, isotropic rod], nu: [0.1, 0.3], m: 1, n: 2, limits: {kappa_n: [-30, 30]}}"
 
 
+@pytest.mark.skipif(not (NODE or CHROMIUM), reason="neither Node nor Chromium on the PATH (Debian: apt-get install nodejs)")
+def test_one_exact_point_of_each_law_is_that_of_the_model(tmp_path):
+    """Within 1e-10 of `ribbon_model.exact`, at equal amplitude; of finite width, whose model takes long, near the circle."""
+    of_page = resources.files("branches.explore")
+    scripts = [(of_page / name).read_text("utf-8") for name in ("shapes.js", "exact.js", "follow.js", "exact_width.js")]
+    laws = {"ribbon": None, "flat rod": None, "isotropic rod": None, "finite width": 8.0}
+    asked = [(law, 1, 2, 0.3, [-100, 100], Gamma) for law, Gamma in laws.items()]
+    curves = evaluated(scripts, f"{json.dumps(asked)}.map((one) => exactCurve(...one).points)", tmp_path)
+    for (law, Gamma), points in zip(laws.items(), curves):
+        near = exact.curve(1, 2, {"nu": 0.3, "Gamma": Gamma}, (-100, 3.565 if Gamma else 100), step=0.2, law=law)[2]
+        point = min(points, key=lambda point: math.dist(*[[at["kappa_n"], at["kappa_star"]] for at in (vars(near), point)]))
+        there = exact.solve(1, 2, 0.3, near, amplitude=point["amplitude"], law=law)
+        assert point["amplitude"] > 1e-3
+        for name in ("kappa_n", "kappa_star", "energy"):
+            assert point[name] == pytest.approx(getattr(there, name), rel=1e-10, abs=1e-10)
+
+
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """Folder with m1_n2.h5 (with the index), and the diagrams fig12 and laws."""
@@ -615,23 +632,6 @@ def test_page_of_a_network(tmp_path, root, browser):
         browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=blind)
     assert browser.colours("#ribbon") > 100
     assert browser.errors == []
-
-
-@pytest.mark.skipif(not (NODE or CHROMIUM), reason="neither Node nor Chromium on the PATH (Debian: apt-get install nodejs)")
-def test_one_exact_point_of_each_law_is_that_of_the_model(tmp_path):
-    """Within 1e-10 of `ribbon_model.exact`, at equal amplitude; of finite width, whose model takes long, near the circle."""
-    of_page = resources.files("branches.explore")
-    scripts = [(of_page / name).read_text("utf-8") for name in ("shapes.js", "exact.js", "follow.js", "exact_width.js")]
-    laws = {"ribbon": None, "flat rod": None, "isotropic rod": None, "finite width": 8.0}
-    asked = [(law, 1, 2, 0.3, [-100, 100], Gamma) for law, Gamma in laws.items()]
-    curves = evaluated(scripts, f"{json.dumps(asked)}.map((one) => exactCurve(...one).points)", tmp_path)
-    for (law, Gamma), points in zip(laws.items(), curves):
-        near = exact.curve(1, 2, {"nu": 0.3, "Gamma": Gamma}, (-100, 3.565 if Gamma else 100), step=0.2, law=law)[2]
-        point = min(points, key=lambda point: math.dist(*[[at["kappa_n"], at["kappa_star"]] for at in (vars(near), point)]))
-        there = exact.solve(1, 2, 0.3, near, amplitude=point["amplitude"], law=law)
-        assert point["amplitude"] > 1e-3
-        for name in ("kappa_n", "kappa_star", "energy"):
-            assert point[name] == pytest.approx(getattr(there, name), rel=1e-10, abs=1e-10)
 
 
 @needs_chromium
