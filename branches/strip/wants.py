@@ -107,8 +107,8 @@ def _solutions(strip: Strip, name: str, m: int, wanted: float, places, values) -
 # --- the chart --------------------------------------------------------------------------------------------------------
 
 
-def chart(strip: Strip, m: int, out: Path, quiet: bool = True) -> None:
-    """Draw the barrier of the m-fold circle over Gamma and the natural curvature, with the strip as a point in it.
+def chart(strip: Strip, m: int, out: Path, quiet: bool = True, Gammas=_GAMMAS, parts=_PARTS) -> None:
+    """Draw the barrier of the m-fold circle over Gamma and parts of the stable interval, with the strip as a point in it.
 
     Raises
     ------
@@ -116,30 +116,30 @@ def chart(strip: Strip, m: int, out: Path, quiet: bool = True) -> None:
         The picture cannot be written.
     """
     kappas, table = [], []
-    with Progress("widths", len(_GAMMAS), quiet) as progress:
-        for Gamma in _GAMMAS:
+    with Progress("widths", len(Gammas), quiet) as progress:
+        for Gamma in Gammas:
             progress.part(f"Gamma = {Gamma:.3g}")
             parameters = strip.parameters | {"Gamma": float(Gamma)}
             low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, parameters), *_LONGEST)
-            kappas.append(m * (low + (high - low) * _PARTS))
+            kappas.append(m * (low + (high - low) * parts))
             table.append(barriers_at(m, kappas[-1], parameters))
             progress.part_done()
-    write_picture(_figure(strip, m, np.array(kappas), np.array(table)), out)
+    write_picture(_figure(strip, m, Gammas, np.array(kappas), np.array(table)), out)
 
 
-def _figure(strip: Strip, m: int, kappas: np.ndarray, table: np.ndarray):
+def _figure(strip: Strip, m: int, Gammas: np.ndarray, kappas: np.ndarray, table: np.ndarray):
     """Return the chart from kappa_n and barriers, shape (Gamma, part of the stable interval)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     axes = figure.subplots()
-    widths = np.repeat(_GAMMAS[:, None], len(_PARTS), axis=1)
+    widths = np.repeat(Gammas[:, None], kappas.shape[1], axis=1)
     filled = axes.contourf(widths, kappas, table, levels=12, cmap="viridis")
     axes.contour(widths, kappas, table, levels=filled.levels, colors="white", linewidths=0.4)
     bar = figure.colorbar(filled, ax=axes)
     bar.set_label(f"barrier, in units of $4\\pi^2 B/L$, here {strip.energy_unit:.3g} J")
     for edge, style in ((-1, "--"), (0, "-")):
-        axes.plot(_GAMMAS, kappas[:, edge], style, color="black", label=("lower", "upper")[edge] + " end of stability")
+        axes.plot(Gammas, kappas[:, edge], style, color="black", label=("lower", "upper")[edge] + " end of stability")
     mark = {"marker": "o", "markersize": 8, "color": Colour.VERMILION, "markeredgecolor": "white", "linestyle": "none"}
     axes.plot(strip.Gamma, strip.kappa_n, label="this strip", **mark)
     axes.set_xscale("log")

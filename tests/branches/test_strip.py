@@ -4,6 +4,7 @@ import math
 import re
 import shlex
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from branches.strip import states as strip_states
 from branches.strip.__main__ import main
 from branches.strip.report import assumptions, deviations
 from branches.strip.states import buckled, circles, ways_out
-from branches.strip.wants import answer, barrier, barriers_at
+from branches.strip.wants import answer, barrier, barriers_at, chart
 from ribbon_model.exact_finite_width import curve
 from ribbon_model.laws import FINITE_WIDTH, RIBBON, TwoBendings
 from ribbon_model.linear import energy_interval, thresholds
@@ -204,8 +205,8 @@ def test_dimensions_for_a_barrier():
 
 @pytest.mark.full
 def test_a_chart_is_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("branches.strip.wants._GAMMAS", np.array([0.1, 1.0]))
-    monkeypatch.setattr("branches.strip.wants._PARTS", np.linspace(0.1, 0.9, 3))
+    few = {"Gammas": np.array([0.1, 1.0]), "parts": np.linspace(0.1, 0.9, 3)}
+    monkeypatch.setattr("branches.strip.wants.chart", partial(chart, **few))
     assert main([*OPTIONS, "--chart", str(tmp_path / "chart.png"), "--turns", "3"]) == 0
     assert capsys.readouterr().out == f"written to {tmp_path / 'chart.png'}\n"
     assert (tmp_path / "chart.png").stat().st_size > 10_000

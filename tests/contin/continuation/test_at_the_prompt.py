@@ -1,6 +1,7 @@
 """For people who wait for a run: a line of progress, labels within the limits, and advice that names what helps."""
 
 import io
+import itertools
 import re
 
 import numpy as np
@@ -32,8 +33,7 @@ def test_a_line_of_progress(monkeypatch, terminal, wanted, shown):
     contin.trace(parabola(), free=["a"], direction=-1, limits={"a": (-1, 4)})  # compiled before: that shows a line of its own
     file = Terminal(terminal)
     monkeypatch.setattr(progress.sys, "stderr", file)
-    monkeypatch.setattr(progress, "_FIRST", 0.0)
-    monkeypatch.setattr(progress, "_BETWEEN", 0.0)
+    monkeypatch.setattr(progress.time, "monotonic", itertools.count().__next__)  # a second later at every look
     branch = contin.trace(parabola(), free=["a"], direction=-1, limits={"a": (-1, 4)}, progress=wanted)
     assert branch.labelled("LP")
     lines = file.getvalue().split("\r")
@@ -46,8 +46,7 @@ def test_a_line_of_progress(monkeypatch, terminal, wanted, shown):
 def test_progress_of_curves_and_diagrams(monkeypatch):
     file = Terminal(True)
     monkeypatch.setattr(progress.sys, "stderr", file)
-    monkeypatch.setattr(progress, "_FIRST", 0.0)
-    monkeypatch.setattr(progress, "_BETWEEN", 0.0)
+    monkeypatch.setattr(progress.time, "monotonic", itertools.count().__next__)  # a second later at every look
     fork = AlgebraicProblem(lambda u, p: (p.b + p.a * u.x - u.x**3,), ["x"], {"a": -1.0, "b": 0.0})
     found = contin.diagram(contin.solve(fork, [0.0]), free=["a"], depth=1, limits={"a": (-1, 1)}, progress=True)
     assert "branch 1, depth 0: " in file.getvalue()

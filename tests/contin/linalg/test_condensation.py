@@ -121,17 +121,21 @@ def test_the_count_must_be_square():
 SIZES = [(1, 2, 2, 1, 1), (2, 4, 7, 1, 1), (3, 3, 33, 4, 2), (4, 7, 12, 0, 0), (5, 2, 40, 2, 2), (13, 4, 21, 4, 1)]
 
 
+def in_segments(places, blocks):
+    """Factors of a matrix that is divided as a large one is."""
+    return Factorization(places, blocks, segments.share(len(blocks.local), 2**20))
+
+
 @pytest.mark.parametrize("sparse", [False, True])
 @pytest.mark.parametrize("sizes", SIZES)
 def test_segments_agree_with_dense_and_have_the_same_bits_for_all_threads(sizes, sparse, monkeypatch):
-    monkeypatch.setattr(segments, "_LARGE", 0)
     n = sizes[0]
     depends = np.random.default_rng(n).random((n, n)) < 0.3 if sparse else None
     known = None
     for count in (1, 2, 3, 5):
         monkeypatch.setenv("CONTIN_THREADS", str(count))
         places, blocks, dense = random_blocks(*sizes, seed=7, depends=depends)
-        factors = Factorization(places, blocks)
+        factors = in_segments(places, blocks)
         b = np.random.default_rng(1).standard_normal((6, len(dense)))
         found = factors.solve(b), factors.solve_transposed(b), factors.sign
         known = found if known is None else known
@@ -143,22 +147,20 @@ def test_segments_agree_with_dense_and_have_the_same_bits_for_all_threads(sizes,
 
 
 def test_the_determinant_of_segments_changes_sign_with_the_dense_one(monkeypatch):
-    monkeypatch.setattr(segments, "_LARGE", 0)
     monkeypatch.setenv("CONTIN_THREADS", "2")
     signs = []
     for seed in range(20):
         places, blocks, dense = random_blocks(2, 3, 9, 2, 1, seed)
-        signs.append(Factorization(places, blocks).sign * np.sign(np.linalg.det(dense)))
+        signs.append(in_segments(places, blocks).sign * np.sign(np.linalg.det(dense)))
     assert len(set(signs)) == 1
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_singular_matrix_of_segments_gives_no_finite_solution(count, monkeypatch):
-    monkeypatch.setattr(segments, "_LARGE", 0)
     monkeypatch.setenv("CONTIN_THREADS", str(count))
     places, blocks, dense = random_blocks(2, 3, 20, 2, 1)
     blocks.local[7, :, :2] = 0.0
-    factors = Factorization(places, blocks)
+    factors = in_segments(places, blocks)
     assert np.isnan(factors.sign) or factors.sign == 0 or not np.all(np.isfinite(factors.solve(np.ones(len(dense)))))
 
 
