@@ -1,8 +1,9 @@
 """Recording: a user's functions are called once with recorded numbers, and become a tape.
 
 A function that decides by a number (``if u.x > 0``) is called again for each outcome, and the results are joined by selections,
-the last decision first. A function is recorded twice, and compared with its values in Python at a few places: the tape is used
-only where a function does the same each time.
+the last decision first. Where that takes too many calls, as with twenty guards against 0 / 0, independent decisions are joined
+one by one: operations that are others with the other outcome of one become selections. A function is recorded twice, and
+compared with its values in Python at a few places: the tape is used only where a function does the same each time.
 """
 
 from __future__ import annotations
@@ -11,15 +12,16 @@ import contextlib
 import dis
 import functools
 import math
-from collections.abc import Callable, Sequence
+import sys
+import types
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin import checks
+from contin import checks, draws
 from contin.arrays import Function
-from contin.draws import generator
 from contin.errors import ProblemError
 from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, numbers
@@ -31,7 +33,8 @@ from contin.functions.tape import Tape, Unrecordable
 from contin.levels import LOCATED
 
 #: Largest number of paths through the decisions of one function, and of decisions on a path. A path doubles the operations at
-#: most; with ten times as many, a function of 100 operations could become one of 64,000.
+#: most; with ten times as many, a function of 100 operations could become one of 64,000. Decisions that are joined one by one
+#: are compared with a quarter as many random paths.
 _PATHS = 64
 
 
@@ -128,15 +131,37 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
     ------
     Unrecordable
     """
-    copy = prepared(function)
-    calls, searches = 0, tape.searches
+    paths, before = _Paths(tape, functools.partial(call, prepared(function)), tape.searches), tape.decide
+    try:
+        try:
+            values = paths.explored([])
+        except _ManyPaths:
+            values = paths.one_by_one()
+        if values:
+            return values
+        raise Unrecordable("it has no value on any path")
+    except _ManyPaths:
+        raise Unrecordable(
+            f"it has more than {_PATHS} paths through decisions that depend on each other (write those of values as "
+            "np.where(condition, a, b)), or a loop that ends by a comparison"
+        ) from None
+    finally:
+        tape.decide = before
 
-    def explore(before: list[tuple[int, bool]]) -> list[int]:
-        nonlocal calls
-        calls += 1
-        if calls > _PATHS:
-            raise Unrecordable(f"it has more than {_PATHS} paths through its decisions, or a loop that ends by a comparison")
+
+@dataclass
+class _Paths:
+    """The paths through the decisions of a function, of which a ``call`` returns the values."""
+
+    tape: Tape
+    call: Callable[[], Sequence[Any]]
+    searches: int
+    calls: int = 0
+
+    def taken(self, before: list[tuple[int, bool]], outcomes: Mapping[int, bool]) -> _Path:
+        """Return the path that begins with some decisions, and then takes the ``outcomes`` of conditions, true if none."""
         taken: list[tuple[int, bool]] = []
+        whole: dict[int, dict[tuple[int, str], int]] = {}
 
         def decide(condition: int) -> bool:
             known = dict(taken)
@@ -144,26 +169,107 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
                 place = len(taken)
                 if place < len(before) and before[place][0] != condition:
                     raise Unrecordable("its decisions are not the same when it is called again")
-                known[condition] = before[place][1] if place < len(before) else True
+                known[condition] = before[place][1] if place < len(before) else outcomes.get(condition, True)
                 taken.append((condition, known[condition]))
+                whole[condition] = _whole_numbers()
                 if len(taken) > _PATHS:
                     raise Unrecordable("it has a loop that ends by a comparison")
             return known[condition]
 
-        tape.decide, tape.searches = decide, searches
-        values = _places(tape, call, copy)
+        self.tape.decide, self.tape.searches = decide, self.searches
+        return _Path(_places(self.tape, self.call), taken, whole)
+
+    def explored(self, before: list[tuple[int, bool]], apart: Collection[int] = ()) -> list[int]:
+        """Return the places of the values, joined over all outcomes of further decisions but for some conditions."""
+        self.calls += 1
+        if self.calls > _PATHS:
+            raise _ManyPaths
+        values, taken, _ = self.taken(before, {})
         for place in range(len(taken) - 1, len(before) - 1, -1):
             condition = taken[place][0]
-            values = _joined(tape, condition, values, explore([*taken[:place], (condition, False)]))
+            if condition not in apart:
+                values = _joined(self.tape, condition, values, self.explored([*taken[:place], (condition, False)], apart))
         return values
 
-    before = tape.decide
-    try:
-        if values := explore([]):
-            return values
-        raise Unrecordable("it has no value on any path")
-    finally:
-        tape.decide = before
+    def one_by_one(self) -> list[int]:
+        """Return the places of the values with selections where the other outcome of one decision makes a difference.
+
+        They are compared with paths of random outcomes.
+
+        Raises
+        ------
+        _ManyPaths
+            Decisions are not independent.
+        """
+        first, others, done = self.taken([], {}), dict[int, list[int]](), dict[Any, int]()
+        conditions = [condition for condition, _ in first.taken]
+        for place, condition in enumerate(conditions):
+            self.calls = 0
+            others[condition] = self.explored([*first.taken[:place], (condition, False)], conditions)
+        if any(len(each) != len(first.values) for each in others.values()):
+            raise _ManyPaths
+        apart = [{each: found[row] for each, found in others.items()} for row in range(len(first.values))]
+        values = [_combined(self.tape, done, *each) for each in zip(first.values, apart)]
+        random = draws.generator("independent decisions")
+        for draw in range(_PATHS // 4):
+            path = self.taken([], {each: draw > 0 and bool(random.integers(2)) for each in conditions})
+            known = {each: self.tape.constant(float(outcome)) for each, outcome in path.taken}
+            if path.differs(first) or self.tape.substitute(values, known) != path.values:
+                raise _ManyPaths
+        return values
+
+
+class _ManyPaths(Exception):
+    """There are too many paths through the decisions of a function."""
+
+
+class _Path(NamedTuple):
+    """One call of a function: places of its values, its decisions with their outcomes, and whole numbers known at each."""
+
+    values: list[int]
+    taken: list[tuple[int, bool]]
+    whole: dict[int, dict[tuple[int, str], int]]
+
+    def differs(self, other: _Path) -> bool:
+        """Return whether a variable with a whole number, as a count, depends on outcomes: others may depend on it."""
+        return any(
+            value != other.whole[condition].get(name, value)
+            for condition in self.whole.keys() & other.whole.keys()
+            for name, value in self.whole[condition].items()
+        )
+
+
+def _whole_numbers() -> dict[tuple[int, str], int]:
+    """Return the variables with whole numbers, or truth values, of a user's functions that wait for a decision."""
+    found, depth = dict[tuple[int, str], int](), 0
+    frame: types.FrameType | None = sys._getframe(2)
+    while frame is not None and frame.f_code is not _places.__code__:
+        if not str(frame.f_globals.get("__name__")).startswith("contin.functions."):
+            found |= {(depth, name): value for name, value in frame.f_locals.items() if isinstance(value, int)}
+        frame, depth = frame.f_back, depth + 1
+    return found
+
+
+def _combined(tape: Tape, done: dict[Any, int], value: int, others: dict[int, int]) -> int:
+    """Return the place of a value that is another one where a condition is false: ``others`` by condition, for each alone."""
+    others = {condition: other for condition, other in others.items() if other != value}
+    key = value, *others.items()
+    if others and key not in done:
+        name, operands, data = tape.operations[value]
+        aligned = {each: _aligned(operands, tape.operations[other].operands) for each, other in others.items()}
+        if operands and all(tape.operations[other][::2] == (name, data) for other in others.values()) and name != "select":
+            parts = [{each: found[row] for each, found in aligned.items()} for row in range(len(operands))]
+            done[key] = tape.at(name, tuple(_combined(tape, done, *each) for each in zip(operands, parts)), data)
+        else:
+            condition, other = others.popitem()
+            done[key] = tape.at("select", (condition, _combined(tape, done, value, others), other))
+    return done.get(key, value)
+
+
+def _aligned(operands: tuple[int, ...], others: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the operands of a sum or a product in the order that has one in common with others, if they have."""
+    crossed = len(operands) == 2 and (operands[0] == others[-1] or operands[1] == others[0]) and operands[0] != others[0]
+    return others[::-1] if crossed and operands[1] != others[-1] else others
 
 
 def _joined(tape: Tape, condition: int, values: list[int], others: list[int]) -> list[int]:
@@ -175,10 +281,10 @@ def _joined(tape: Tape, condition: int, values: list[int], others: list[int]) ->
     return [tape.at("select", (condition, a, b)) for a, b in zip(values or none, others or none)]
 
 
-def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: object) -> list[int]:
+def _places(tape: Tape, call: Callable[[], Sequence[Any]]) -> list[int]:
     """Return the places of a function's values on one path; none where Python raises an error of arithmetic."""
     try:
-        return [tape.number(_real(value)).place for value in call(copy)]
+        return [tape.number(_real(value)).place for value in call()]
     except ProblemError:
         raise
     except Exception as error:  # a user's function may raise anything when it is not given floating-point numbers
@@ -218,7 +324,11 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
     Unrecordable
         They differ.
     """
+<<<<<<< HEAD
     random = generator("recording")
+=======
+    random = draws.generator(__name__)
+>>>>>>> e3bed2c0 (Independent guards of a function are joined one by one)
     for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1

@@ -238,6 +238,62 @@ def test_arrays_and_objects(case):
             assert slopes[0, 0, i] == pytest.approx((8 * sides[0] - sides[1]) / (12 * h), rel=1e-8, abs=1e-9)
 
 
+def _guard(x):
+    if abs(x) > 1e-6:
+        return x / (1 - math.exp(-x))
+    return 1 + x / 2
+
+
+def _nested_guards(u, p):
+    values = []
+    for k in range(20):
+        x = u[k] - k
+        if x > 1e-6:
+            rate = x / (1 - math.exp(-x))
+        elif x < -1e-6:
+            rate = x * math.exp(x) / (math.exp(x) - 1)
+        else:
+            rate = 1 + x / 2
+        values.append(rate * (1 - u[k]) - u[(k + 1) % 20] * rate)
+    return values
+
+
+GUARDED = {
+    "nested": _nested_guards, "product": lambda u, p: math.prod(_guard(x) for x in u) * u,
+    "sum": lambda u, p: sum(_guard(u[k] - k) * u[k] for k in range(20)) * u + [_guard(x) for x in u],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GUARDED)
+def test_independent_guards_are_joined_one_by_one(name):
+    """Twenty of them have a million paths or more; values and derivatives are those of Python on any of them."""
+    batch = Batch([GUARDED[name]], [20], [f"x{k}" for k in range(20)], [], times=False)
+    assert batch.interpreted is None, batch.describe()
+    u = np.random.default_rng(0).normal(0, 3, (40, 20))
+    u[0], u[1], u[2, :10] = np.arange(20), 1e-8, np.arange(10)
+    given = np.zeros(40), u, np.empty((0, 20)), np.empty(0)
+    expected = np.array([GUARDED[name](each, ()) for each in u])
+    assert np.abs(batch.values(*given) - expected).max() <= 1e-14 * np.abs(expected).max()
+    step = 1e-5 * np.eye(20)[3]
+    slope = np.array([np.subtract(GUARDED[name](each + step, ()), GUARDED[name](each - step, ())) for each in u[3:]]) / 2e-5
+    found = batch.jacobian(*given, batch.columns([]))[1][3:, :, 3]
+    assert np.abs(found - slope).max() <= 1e-8 * np.abs(slope).max()
+
+
+def _counted(u, p):
+    count = 0
+    for x in u:
+        if x > 0:
+            count += 1
+    return [x if count == 2 else 2 * x for x in u]
+
+
+def test_decisions_that_depend_on_each_other_are_not_joined():
+    """No path of one or of random outcomes shows that two of twenty make a difference; the count does."""
+    batch = Batch([_counted], [20], [f"x{k}" for k in range(20)], [], times=False)
+    assert "write those of values as np.where(condition, a, b)" in batch.describe()
+
+
 def test_random_expressions():
     """Two hundred random formulas of three inputs: value bit for bit as Python, gradient and Hessian against tangents of
     tangents."""
