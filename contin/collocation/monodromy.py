@@ -7,22 +7,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import APART, LOCATED
 from contin.linalg.periodic import Product, fill_logarithms, product_of
+from contin.linalg.spectrum import fill_eigenvalues
 from contin.linalg.transitions import condense
 
-#: What comes of it: multipliers; one of an autonomous system that should be 1 and has drifted; none, which are NaN.
-KNOWN, DRIFTED, NOT_FINITE = range(3)
+#: What comes of it: multipliers; one of an autonomous system that should be 1 and has drifted; none, which are NaN; none, as
+#: an interval is too long.
+KNOWN, DRIFTED, NOT_FINITE, COARSE = range(4)
+#: Largest size of a rate times the length of an interval. A method of degree d takes (1 + z / 2 + ...) / (1 - z / 2 + ...) for
+#: exp(z), which tends to 1 or -1 on both sides: at 2 and degree 4 the logarithm is off by 2e-5 of it; ten times larger, by more
+#: than it.
+_LONG = 2.0
+#: Intervals are divided where perturbations grow by more than this as a logarithm: beside saddles, where cycles of long periods
+#: have long intervals, growth and decay cancel. Ten times larger, they do not beside a saddle that is near a fold; ten times
+#: smaller, stiff relaxation oscillations take longer, all modes of which decay.
+_GROWS = 0.1
+#: Largest number of parts of an interval: they hold a growth by exp(200).
+_PARTS = 100
 
 
 class Monodromy(NamedTuple):
     """The room for it.
 
-    ``jacobian`` (N d, n, n) is given; ``order`` (n,) are the states by which its columns stand in a linearized system.
-    ``matrices`` (N, n, n) are transitions and, where there is a symmetry, its inverse. ``real`` and ``imaginary`` (n,) are the
-    logarithms found.
+    ``jacobian`` (N d, n, n) is given; ``order`` (n,) are the states by which its columns stand in a linearized system. An
+    interval may have the ``length``, times the size of a rate. ``matrices`` (N, n, n) are transitions and, where there is a
+    symmetry, its inverse. ``real`` and ``imaginary`` (n,) are the logarithms found.
     """
 
     value: Matrix
@@ -30,6 +43,7 @@ class Monodromy(NamedTuple):
     h: Vector
     quadrature: Vector
     order: IndexVector
+    length: float
     autonomous: int
     planar: int
     jacobian: Stack
@@ -41,7 +55,7 @@ class Monodromy(NamedTuple):
     imaginary: Vector
 
 
-def monodromy_of(system: Any) -> Monodromy:
+def monodromy_of(system: Any, length: float = _LONG) -> Monodromy:
     """Return the room of a system of cycles."""
     n, d, intervals = system.states_count, system.degree, system.intervals
     symmetric = system.order > 1
@@ -50,7 +64,7 @@ def monodromy_of(system: Any) -> Monodromy:
         matrices[-1] = np.linalg.inv(system.turn)
     return Monodromy(
         system.basis.value, system.basis.slope, np.diff(system.mesh), system.gauss_weights, system.order_of_states,
-        int(system.autonomous), int(system.autonomous and n == 2 and not symmetric), np.empty((intervals * d, n, n)),
+        length, int(system.autonomous), int(system.autonomous and n == 2 and not symmetric), np.empty((intervals * d, n, n)),
         np.empty((d * n, (d + 1) * n)), np.empty((d + 1) * n, np.int64), matrices, product_of(len(matrices), n),
         np.empty(n), np.empty(n),
     )  # fmt: skip
@@ -61,6 +75,9 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
     """Fill in the logarithms, or put right by Liouville's formula those that are ``known``; return what comes of it."""
     real, imaginary, n = room.real, room.imaginary, room.real.size
     if not known:
+        for j in range(0 if room.planar else room.h.size):
+            if is_coarse(room, j):
+                return COARSE
         condense(room.value, room.slope, room.h, room.jacobian, room.block, room.pivots, room.matrices[: room.h.size])
         fill_logarithms(room.matrices, room.product, real, imaginary)
         if real[0] != real[0] and not room.planar:  # noqa: PLR0124
@@ -99,3 +116,35 @@ def nearest_to_one(room: Monodromy) -> tuple[int, float]:
         if size < least:
             place, least = a, size
     return place, least
+
+
+@helper
+def is_coarse(room: Monodromy, j: int) -> bool:
+    """Return whether perturbations grow and decay too much over an interval, by the eigenvalues in its middle."""
+    n, d, size, growth = room.real.size, room.jacobian.shape[0] // room.h.size, 0.0, 0.0
+    middle = room.jacobian[j * d + d // 2]
+    for a in range(n):  # bounds of both
+        others = 0.0
+        for b in range(n):
+            others += abs(middle[a, b]) if b != a else 0.0
+        size, growth = max(size, others + abs(middle[a, a])), max(growth, others + middle[a, a])
+    if not (room.h[j] * size > room.length and room.h[j] * growth > _GROWS):
+        return False
+    for a in range(n):
+        for b in range(n):
+            room.product.square[0, a, b] = middle[a, b]
+    real, imaginary = room.product.parts[:1], room.product.parts[1:]
+    fill_eigenvalues(room.product.square, n, real, imaginary)
+    size, growth = 0.0, 0.0
+    for a in range(n):
+        size, growth = max(size, math.hypot(real[0, a], imaginary[0, a])), max(growth, real[0, a])
+    return room.h[j] * size > room.length and room.h[j] * growth > _GROWS
+
+
+def resolving(system: Any, room: Monodromy) -> Array:
+    """Return the mesh with intervals divided over which perturbations grow and decay too much."""
+    rates = np.linalg.eigvals(room.jacobian[system.degree // 2 :: system.degree])
+    sizes = np.where(room.h * rates.real.max(axis=1) > _GROWS, room.h * np.abs(rates).max(axis=1), 0.0)
+    parts = np.ceil(sizes / room.length).clip(1, _PARTS).astype(int)
+    pieces = [left + h * np.arange(count) / count for left, h, count in zip(system.mesh, room.h, parts)]
+    return np.append(np.concatenate(pieces), system.mesh[-1])

@@ -17,7 +17,7 @@ from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
 from contin.collocation.extremes import extremes
 from contin.collocation.mesh import MeshControl
-from contin.collocation.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
+from contin.collocation.monodromy import COARSE, DRIFTED, Monodromy, fill_multipliers, monodromy_of, resolving
 from contin.core.protocol import Carrier
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
@@ -287,8 +287,15 @@ class PeriodicEquations(Collocation):
 
     def _computed(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
-        room, _ = self._filled(x)
-        return room.real + 1j * room.imaginary
+        return self._resolved(x, *self._filled(x))
+
+    def _resolved(self, x: Array, room: Monodromy, outcome: int) -> ComplexArray:
+        """Return the logarithms of the multipliers; on a finer mesh where intervals are too long for them."""
+        if outcome != COARSE:
+            return room.real + 1j * room.imaginary
+        finer, carry = self.on_mesh(resolving(self, room))
+        finer._monodromies[threading.get_ident()] = monodromy_of(finer, math.inf)
+        return finer._computed(carry(x))
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
@@ -428,7 +435,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
             values = log_eigenvalues_along(room.matrices, np.concatenate([flow[:count], flow[:1]]))
             room.real[:], room.imaginary[:] = values.real, values.imag
             fill_multipliers(room, 1)
-        return room.real + 1j * room.imaginary
+        return self._resolved(x, room, outcome)
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""

@@ -26,6 +26,7 @@ from contin.core.rounding import changes_of_multipliers
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial, sign_changed
 from contin.cycles.equations import PeriodicEquations
+from contin.cycles.homoclinic import is_still
 from contin.cycles.map_equations import MapEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -223,6 +224,8 @@ def _may_double(arc: Arc) -> bool:
 
 def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
+    if _is_still(arc):
+        return []
     test = doubling(arc.trial.system.order)
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(arc, MINUS_ONE):
@@ -235,6 +238,12 @@ def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
               if sign_changed(left[1].value(test), right[1].value(test))
               and _changes_on_finer_mesh(left[1], right[1], test, arc.newton)]  # fmt: skip
     return [_doubtful(arc.locate(test, left, right)) for left, right in pieces]
+
+
+def _is_still(arc: Arc) -> bool:
+    """Return whether the cycle at the end of a step cannot be told from a homoclinic orbit."""
+    system: Any = arc.trial.system
+    return bool(system.autonomous and system.intervals) and is_still(arc.trial)
 
 
 def _comes_near(arc: Arc, what: int) -> bool:
@@ -293,7 +302,7 @@ def _may_twist(arc: Arc) -> bool:
 
 def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    if not _may_twist(arc):
+    if _is_still(arc) or not _may_twist(arc):
         return []
     return [_doubtful(point) for point in hopf_points(arc, knots) if _passes(arc, point)]
 

@@ -96,6 +96,11 @@ def _liveliness(trial: Trial) -> float:
     return value if value > 0 or resting_place(system, trial.x) is not None else 1.0
 
 
+def is_still(trial: Trial) -> bool:
+    """Return whether a cycle cannot be told from a homoclinic orbit, so that its multipliers mean nothing."""
+    return _liveliness(trial) <= 0
+
+
 def _speeds(system: Any, x: Array) -> Array:
     """Return the speeds of a cycle at the Gauss points, scaled, shape (N d,)."""
     return np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
