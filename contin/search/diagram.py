@@ -228,17 +228,25 @@ class _Explorer:
         """Look for solutions that no branch has reached, and follow them to the same depth."""
         primary = self.settings.primary or start.system.free[0]
         kept = self.settings, self.symmetries, self.tolerance
-        self._sites = [Site(primary, float(value), *kept) for value in search.values]
-        for number, site in enumerate(self._sites):
-            reached = [points for branch in self.result.branches if (points := [p for p in branch if _is_like(p, start)])]
-            for points in reached:
-                site.add_from(points)
-            beside = [other for other in self._sites[max(number - 1, 0) : number + 2] if other is not site]
-            elsewhere = [point for points in reached for point in points if any(other.holds(point) for other in beside)]
-            if not elsewhere and not site.known:
-                elsewhere = [min(points, key=site.distance) for points in reached]
-            follow = functools.partial(self._follow_found, site, start, depth)
-            self.result.searches.append(site.search(search, elsewhere, number, follow))
+        self._sites = [
+            Site(primary, float(value), *kept, search, number) for number, value in enumerate(sorted(set(search.values)))
+        ]
+        while sum(self._search_at(number, start, depth) for number in range(len(self._sites))):
+            pass
+        self.result.searches = [site.account for site in self._sites]
+
+    def _search_at(self, number: int, start: Point, depth: int) -> int:
+        """Search at one value, with the solutions at those beside it as guesses; return how many are found."""
+        site = self._sites[number]
+        reached = [points for branch in self.result.branches if (points := [p for p in branch if _is_like(p, start)])]
+        for points in reached:
+            site.add_from(points)
+        beside = [other for other in self._sites[max(number - 1, 0) : number + 2] if other is not site]
+        elsewhere = [point for points in reached for point in points if any(other.holds(point) for other in beside)]
+        if not elsewhere and not site.known:
+            elsewhere = [min(points, key=site.distance) for points in reached]
+        follow = functools.partial(self._follow_found, site, start, depth)
+        return site.search(elsewhere, follow)
 
     def _follow_found(self, site: Site, start: Point, depth: int, point: Point, account: Searched) -> None:
         """Follow a solution that a search has found both ways, and what leaves there."""

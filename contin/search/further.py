@@ -7,7 +7,8 @@ At each value:
    guesses that are given, states of branches at other values, known states with the sign reversed, their images under given
    maps, and with random perturbations. Where it does not converge, take damped Newton steps from the guess itself.
 3. Correct what it finds, adapt the mesh, and compare it with all that is known. The caller follows each new one both ways; its
-   branch is known from then on, and its states at this value are guesses, too.
+   branch is known from then on, and its states at this value are guesses, too. They are guesses at the values beside this one,
+   which are searched again until nothing is new.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ class Search:
     Attributes
     ----------
     values : sequence of float
-        Of the primary parameter, inside its limits. All branches of the diagram have a point (UZ) there. Not of
-        `contin.lowlevel.further`.
+        Of the primary parameter, inside its limits. All branches of the diagram have a point there: UZ, or EP where they begin.
+        What is found at one value is a guess at those beside it, whatever their order. Not of `contin.lowlevel.further`.
     sizes : sequence of float
         Sizes of random perturbations of known states, relative to 1 + the size of each state.
     draws : int
@@ -173,14 +174,22 @@ class Site:
         With the identity.
     tolerance : float
         Relative distance below which two solutions are one.
+    search : Search
+    number : int
+        Of the value: each has random numbers of its own.
     """
 
     def __init__(
-        self, primary: str, value: float, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float
-    ) -> None:
+        self, primary: str, value: float, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float,
+        search: Search, number: int = 0,
+    ) -> None:  # fmt: skip
         self.primary, self.value, self.settings = primary, value, settings
         self.symmetries, self.tolerance = symmetries, tolerance
         self.known: list[Point] = []
+        self._search, self._random = search, np.random.default_rng([search.seed, number])
+        self.account = Searched(primary, value)
+        self._elsewhere: list[Point] = []  # guesses that were tried
+        self._bases: list[Point] = []  # solutions of which all guesses were tried, here or, where none is known, elsewhere
 
     def holds(self, point: Point) -> bool:
         """Return whether a point lies at the value."""
@@ -201,54 +210,51 @@ class Site:
             if self.holds(point) and not self.knows(point):
                 self.known.append(point)
 
-    def search(
-        self, search: Search, elsewhere: Sequence[Point], number: int, follow: Callable[[Point, Searched], None]
-    ) -> Searched:
-        """Search from all guesses, and return the account.
+    def search(self, elsewhere: Sequence[Point], follow: Callable[[Point, Searched], None]) -> int:
+        """Search from all guesses that were not tried before, add to the account, and return how many solutions are found.
 
         Parameters
         ----------
-        search : Search
         elsewhere : sequence of Point
             Solutions at other values; there is one at least, or one is known here.
-        number : int
-            Of the value: each has random numbers of its own.
         follow : callable
             Follows a new solution, and adds what becomes known by it.
         """
-        account = Searched(self.primary, self.value, len(self.known))
-        for kind, system, x in self._guesses(search, elsewhere, np.random.default_rng([search.seed, number])):
-            account.guesses[kind] += 1
-            while (point := self._beside(system, x, account)) is not None:
-                account.found.append(point)
-                self.known.append(point)
-                follow(point, account)
-                if len(account.found) == search.most:
-                    account.stop = f"ended at most = {search.most}"
-                    return account
-        account.stop = "all guesses tried"
-        return account
+        account, before = self.account, len(self.account.found)
+        account.known = account.known if account.stop else len(self.known)
+        if before < self._search.most:
+            account.stop = "all guesses tried"
+            for kind, system, x in self._guesses(elsewhere):
+                account.guesses[kind] += 1
+                while (point := self._beside(system, x, account)) is not None:
+                    account.found.append(point)
+                    self.known.append(point)
+                    follow(point, account)
+                    if len(account.found) == self._search.most:
+                        account.stop = f"ended at most = {self._search.most}"
+                        return len(account.found) - before
+        return len(account.found) - before
 
-    def _guesses(
-        self, search: Search, elsewhere: Sequence[Point], random: np.random.Generator
-    ) -> Iterator[tuple[str, System, Array]]:
+    def _guesses(self, elsewhere: Sequence[Point]) -> Iterator[tuple[str, System, Array]]:
         """Yield kinds of guesses and guesses, those of solutions that are found meanwhile, too."""
-        first = self.held((*self.known, *elsewhere)[0])[0]
-        for guess in search.guesses:
+        search, first = self._search, self.held((*self.known, *elsewhere)[0])[0]
+        for guess in () if self._bases else search.guesses:
             yield "given", *self._given(first, guess)
-        for point in elsewhere:
+        fresh = [point for point in elsewhere if not any(point is other for other in self._elsewhere)]
+        self._elsewhere += fresh
+        for point in fresh:
             yield "other values", *self.held(point)
-        bases, done = ([] if self.known else elsewhere), 0
-        while done < len(bases) + len(self.known):
-            system, x = self.held([*bases, *self.known][done])
-            done += 1
+        bases = list(elsewhere) if not self.known and not self._bases else []
+        while waiting := [point for point in (*bases, *self.known) if not any(point is base for base in self._bases)]:
+            self._bases.append(waiting[0])
+            system, x = self.held(waiting[0])
             states = np.arange(x.size) < system.state_size
             yield "reversed", system, np.where(states, -x, x)
             for each in search.maps:
                 yield "mapped", system, _fitted(system, _mapped(system, each, x))
             for size in search.sizes:
                 for _ in range(search.draws):
-                    yield "random", system, _fitted(system, x + size * _perturbation(system, x, random))
+                    yield "random", system, _fitted(system, x + size * _perturbation(system, x, self._random))
 
     def held(self, point: Point) -> tuple[System, Array]:
         """Return the system of a point with the primary parameter held at the value, and the point for it."""
@@ -332,9 +338,10 @@ def further(
     check_maps("symmetries", symmetries)
     checks.number("tolerance", tolerance, 0)
     maps: list[Symmetry] = [lambda t, u: u, *symmetries, *declared(problem, "symmetries").values()]
-    site = Site(name, known[0][name], settings or Settings(), maps, tolerance)
+    site = Site(name, known[0][name], settings or Settings(), maps, tolerance, search or Search())
     site.add_from(known)
-    return site.search(search or Search(), (), 0, lambda point, account: None)
+    site.search((), lambda point, account: None)
+    return site.account
 
 
 def _mapped(system: System, each: Symmetry, x: Array) -> Array:

@@ -185,6 +185,13 @@ def test_states_of_an_energy():
     assert sorted({point.index for point in points}) == [0, 1]
 
 
+def test_the_order_of_values_changes_nothing():
+    """What is found at one value is a guess at those beside it, before and after it."""
+    told = [repr(diagram(solve(line_and_circle(), [0.0]), free=["a"], limits={"a": (0, 2)}, search=Search(values, draws=1)))
+            for values in ([0.8, 1.0], [1.0, 0.8, 1.0])]  # fmt: skip
+    assert told[0] == told[1] and "search at a = 0.8: 1 known, 1 more found (branch 2)" in told[0]
+
+
 # --- the account, and wrong input ------------------------------------------------------------------------------------
 
 
