@@ -54,9 +54,10 @@ def batch(
     values : sequence of mappings
         Parameter values by name; those that are left out have the problem's defaults.
     workers : int, or executor
-        Number of processes of this machine; 1 computes here. Or anything with ``submit(function, job)`` that returns futures: a
-        client of Dask, or an executor of `concurrent.futures`. On Linux processes are forks, and take any function; a pool of
-        processes takes one that can be imported. Where a process dies, the rows that it leaves are failures.
+        Number of processes of this machine; 1 computes here. Or anything with ``submit(function, job)`` that returns futures (a
+        client of Dask, an executor of `concurrent.futures`), or with ``map(function, jobs)`` (a pool of `multiprocessing`). On
+        Linux processes are forks, and take any function; a pool of processes takes one that can be imported. Where a process
+        dies, the rows that it leaves are failures; a pool of `multiprocessing` does not come back.
 
     Returns
     -------
@@ -80,6 +81,10 @@ def batch(
     if hasattr(workers, "submit"):
         job = functools.partial(_sent, function, pickle.dumps(problem))
         return list(_gathered([(workers.submit(job, each), each) for each in jobs]))
+    if hasattr(workers, "map"):
+        return [row for rows in workers.map(functools.partial(_sent, function, pickle.dumps(problem)), jobs) for row in rows]
+    if not hasattr(workers, "__index__"):
+        raise ProblemError(f"workers: {workers!r} must be a whole number, or have submit or map, as executors and pools have")
     checks.whole("workers", workers, 1, MOST)
     first = _rows(function, problem, jobs[0]) if jobs else []  # processes are forked with what this one has recorded
     if workers == 1 or len(jobs) < 3:

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import math
+import multiprocessing
 import os
 
 import pytest
@@ -32,11 +33,14 @@ def unsendable(problem, values):
     return (lambda: 0) if values["a"] > 38 else 0
 
 
-@pytest.fixture(scope="module", params=["here", "processes", "threads", "pool", "Dask"])
+@pytest.fixture(scope="module", params=["here", "processes", "threads", "pool", "multiprocessing", "Dask"])
 def workers(request):
     """Everything that `batch` takes for workers."""
     if request.param in ("here", "processes"):
         yield {"here": 1, "processes": 2}[request.param]
+    elif request.param == "multiprocessing":
+        with multiprocessing.get_context("spawn").Pool(2) as pool:
+            yield pool
     elif request.param == "Dask":
         distributed = pytest.importorskip("distributed")
         with (
@@ -107,6 +111,7 @@ def test_nothing_to_do():
 @pytest.mark.parametrize("values, workers, said", [
     ([{"a": "1"}], 1, "values: a: '1' must be a number"),
     ([{"a": 1.0}], 0, "workers: 0 must be a whole number from 1 to 1024"),
+    ([{"a": 1.0}], "all", "workers: 'all' must be a whole number, or have submit or map, as executors and pools have"),
     (3, 1, "values: 3 must be a list"),
 ])  # fmt: skip
 def test_wrong_input(values, workers, said):
