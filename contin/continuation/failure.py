@@ -30,6 +30,8 @@ _LOOSER = (1e3, 1e4, 1e5)
 _STEPS = 10
 #: Each of them is tried so much longer than the one before.
 _LONGER = 1.5
+#: Largest growth of a size since the start: numbers there are round-off then. Ten times larger, a run has six points more.
+_FAR = 1 / np.finfo(float).eps
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
@@ -182,10 +184,24 @@ def _next(state: State, step: float, settings: Settings) -> Trial | None:
     return trial if finite and judged(state, guess, trial).turn <= aims(settings, state.system)[0] else None
 
 
-def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes) -> Stop | None:
-    """Return why a run ends after a step: it has as many points as it may have, or its primary parameter stands still."""
+def runs_away(system: Discretization, start: Discretization) -> bool:
+    """Return whether sizes are so much larger than at the start that the numbers there are round-off."""
+    now, then = system.solution.scales, start.solution.scales
+    grown = np.append(now.states / then.states, now.parameters / then.parameters)
+    return bool(grown.max() > _FAR)
+
+
+def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: Discretization) -> Stop | None:
+    """Return why a run ends after a step: it has as many points as it may have, goes to infinity, or stands still."""
     if state.accepted >= settings.max_points:
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
+    if primary not in settings.limits and runs_away(trial.system, start):
+        names = (*(name for name in trial.system.free), "the largest state")
+        sizes = (*(trial[name] for name in trial.system.free), np.abs(trial.system.states(trial.x)).max(initial=0.0))
+        place = ", ".join(f"{name} = {size:.3g}" for name, size in zip(names, sizes))
+        return Stop(
+            Reason.INFINITY, f"the branch goes to infinity: {place}", f"limits of {primary} end it earlier, or let it go on"
+        )
     if not settings.folds or state.accepted != _STANDING or state.sense:
         return None
     stop: Stop | None = trial.system.standstill(trial, primary)

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.failure import ended, met, no_convergence, shorter_steps
+from contin.continuation.failure import ended, met, no_convergence, runs_away, shorter_steps
 from contin.continuation.findings import IndexChange, index_changes, is_confirmed, located_again, told
 from contin.continuation.first import begins_outside, corrected_first, on_branch
 from contin.continuation.judge import Judge
@@ -166,7 +166,7 @@ class Continuation:
         while True:
             due, state = self._adapt(), self.state
             lane = None if state.singular else self._lanes.of(state.system, self.settings, self._notes.is_noisy)
-            if lane is None:
+            if lane is None or runs_away(state.system, self.start[0]):
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self.here())
@@ -244,7 +244,7 @@ class Continuation:
         self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
-        self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes)
+        self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[0])
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, arc.state, accuracy=self._accuracy)

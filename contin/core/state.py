@@ -98,6 +98,7 @@ class Reason(enum.StrEnum):
     EVENT = "event"
     CLOSED = "closed"
     MAX_POINTS = "max points"
+    INFINITY = "infinity"
     NO_CONVERGENCE = "no convergence"
     STANDSTILL = "standstill"
     TRIVIAL_BRANCH = "trivial branch"
