@@ -324,11 +324,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
     Unrecordable
         They differ.
     """
-<<<<<<< HEAD
-    random = generator("recording")
-=======
-    random = draws.generator(__name__)
->>>>>>> e3bed2c0 (Independent guards of a function are joined one by one)
+    random = draws.generator("recording")
     for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()
         time = center + 0.1
