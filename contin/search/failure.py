@@ -168,7 +168,7 @@ def _update(system: System, x: Array) -> Array:
 
 def _noise(system: System, x: Array) -> float:
     """Return by how much the residual changes where x changes by one unit in the last place."""
-    random, residual = draws.generator(__name__), system.residual(x)
+    random, residual = draws.generator("failure of solve"), system.residual(x)
     return max(float(np.abs(system.residual(draws.rounded(random, x)) - residual).max()) for _ in range(draws.DRAWS))
 
 
@@ -264,7 +264,7 @@ def _are_many(system: System, x: Array, rank: _Rank) -> bool:
 
 def _beside(system: System, x: Array) -> Iterator[Array]:
     """Return places around x."""
-    random = draws.generator(__name__)
+    random = draws.generator("failure of solve")
     for sign in np.repeat((1.0, -1.0), draws.PLACES):
         yield x + sign * draws.ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
 
