@@ -13,8 +13,6 @@ if TYPE_CHECKING:  # nothing heavy is imported here: the line is to be shown whi
     from branches.scene.stage import Stage
     from contin import Point
 
-#: Seconds between two updates of the line while nothing else happens. Ten times more would look like a program that hangs.
-_PERIOD = 1.0
 _STARTING = "starting (the first run compiles machine code, which takes half a minute)"
 
 
@@ -43,8 +41,10 @@ class Progress(Display):
     #: The lines that are open. A line inside the block of another one is shown in its place.
     _open: ClassVar[list[Progress]] = []
 
-    def __init__(self, what: str, total: int = 0, quiet: bool = False):
+    def __init__(self, what: str, total: int = 0, quiet: bool = False, period: float = 1.0):
+        """Updates come ``period`` seconds apart where nothing else happens; ten times more look like a program that hangs."""
         super().__init__(quiet)
+        self._period = period
         self._tells = not quiet
         self._quiet = self._silent = True  # as a display of a run, it shows the moving line only
         self._what, self._total, self._done = what, total, 0
@@ -121,7 +121,7 @@ class Progress(Display):
         return max(mean * (self._total - self._done) - min(now - self._part_began, mean), 0.0)
 
     def _tick(self) -> None:
-        while not self._over.wait(_PERIOD):
+        while not self._over.wait(self._period):
             self._show()
 
     def _show(self) -> None:
@@ -133,9 +133,9 @@ class Progress(Display):
 class StartingDisplay(Display):
     """The display of a run; until its first output, a line says that the command is starting."""
 
-    def __init__(self, quiet: bool = False):
+    def __init__(self, quiet: bool = False, period: float = 1.0):
         super().__init__(quiet)
-        self._start = Progress(_STARTING, quiet=quiet).__enter__()
+        self._start = Progress(_STARTING, quiet=quiet, period=period).__enter__()
 
     def note(self, text: str) -> None:
         """Write one line, or several."""

@@ -13,7 +13,6 @@ from branches.graph.closed import _circle
 from branches.graph.kinds import graph_kind
 from branches.graph.stored import new_graph
 from branches.paper import shell_run as shell
-from branches.run import progress as module
 from branches.run.display import Display
 from branches.run.executor import WAIT
 from branches.run.many import _Plan
@@ -85,8 +84,7 @@ def test_nothing_is_shown_if_quiet_or_elsewhere_than_on_a_terminal(monkeypatch, 
 
 def test_the_line_moves_while_nothing_happens(monkeypatch):
     terminal = a_terminal(monkeypatch)
-    monkeypatch.setattr(module, "_PERIOD", 0.01)
-    with Progress("starting"):
+    with Progress("starting", period=0.01):
         time.sleep(0.3)
     assert len(lines(terminal.getvalue())) > 3
 
@@ -116,11 +114,10 @@ def test_the_estimate_of_many_branches_is_steady(monkeypatch, capsys):
     The time so far and the time left add up to the whole within 10 % from the twentieth part of the branches on. In the order
     of m n they add up to 37 % of the whole there, and later to 142 %.
     """
-    now, said = [0.0], []
+    now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    a_terminal(monkeypatch)
+    terminal = a_terminal(monkeypatch)
     display = Display()
-    monkeypatch.setattr(display, "_line", said.append)
     nus = [k / 100 for k in range(20)]
     fields = "law: [ribbon, flat rod, finite width], Gamma: 1, m: [1, 3, 5], n: [1, 2, 3, 4], limits: {kappa_n: [-1e6, 1e6]}"
     config, graph = parse(f"{{nu: {nus}, {fields}}}", "scene"), new_graph()
@@ -138,9 +135,9 @@ def test_the_estimate_of_many_branches_is_steady(monkeypatch, capsys):
         graph.add_node(_circle({"law": one.material, "nu": one.nu, "n": one.n}, 2 * one.n - one.m))
         display.branch_done([], "", done + len(plan.left_out))
         if done + len(plan.left_out) > len(config.scenes) / 20:
-            totals.append(now[0] + _seconds(said[-1]))
+            totals.append(now[0] + _seconds(lines(terminal.getvalue()[-400:])[-1]))
     assert (len(config.scenes), len(plan.left_out)) == (600, 180)
-    assert _seconds(said[-1]) == 0
+    assert _seconds(lines(terminal.getvalue())[-1]) == 0
     assert 0.9 * now[0] < min(totals) <= max(totals) < 1.1 * now[0]
 
 
@@ -200,8 +197,7 @@ def test_secondary_branches_on_a_terminal(command):
 def test_the_start_of_a_run_is_shown_until_its_first_output(monkeypatch, capsys):
     """A first run compiles for half a minute before it has anything to say."""
     terminal = a_terminal(monkeypatch)
-    monkeypatch.setattr(module, "_PERIOD", 0.01)
-    display = StartingDisplay()
+    display = StartingDisplay(period=0.01)
     time.sleep(0.1)
     display.note("the run")
     shown = terminal.getvalue()
