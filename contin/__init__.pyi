@@ -1,17 +1,14 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
 from . import auto07p, lowlevel
-from .boundary.segmented import Segment, SegmentedProblem
-from .boundary.segmented_variational import SegmentedVariationalProblem, VariationalSegment
-from .boundary.statement import BoundaryValueProblem
-from .boundary.variational import VariationalProblem
+from .boundary.statement import BoundaryValueProblem, Segment, SegmentedProblem
+from .boundary.variational import SegmentedVariationalProblem, VariationalProblem, VariationalSegment
 from .collocation.mesh import MeshControl
 from .connections.statement import ConnectionProblem
 from .core.newton import Newton
 from .core.settings import Settings
-from .core.state import Reason
+from .core.step import Reason
 from .core.trial import Event
-from .cycles.map_statement import MapProblem
-from .cycles.statement import CycleProblem
+from .cycles.statement import CycleProblem, MapProblem
 from .equilibria.statement import AlgebraicProblem
 from .errors import ContinError, ConvergenceError, ProblemError
 from .results.branch import Branch

@@ -1,9 +1,23 @@
-"""The exceptions of contin: one sentence each, fit to be shown to a user as it is."""
+"""Exceptions, one sentence each, and checks of what users hand over, which raise them."""
 
 from __future__ import annotations
 
+import collections.abc
+import functools
+import math
+import os
 import sys
+import types
+import typing
 import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ParamSpec, TypeGuard, TypeVar, cast
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.text import ROWS, exact_text
 
 #: Names of modules of the package begin with this.
 _PACKAGE = __name__.partition(".")[0] + "."
@@ -62,3 +76,234 @@ def warn(text: str, category: type[Warning]) -> None:
     while frame.f_back is not None and f"{frame.f_globals.get('__name__', '')}.".startswith((_PACKAGE, "functools.")):
         frame, level = frame.f_back, level + 1
     warnings.warn(text, category, stacklevel=level)
+
+
+_Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
+#: Characters of a value that a message shows: with the rest of the sentence it fits on one line.
+_SHOWN = 60
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as a message shows them: the first of many."""
+    found = list(names)
+    more = f" and {len(found) - ROWS} more" if len(found) > ROWS else ""
+    return ", ".join(found[:ROWS]) + more
+
+
+def shown(value: object) -> str:
+    """Return the value in one short line."""
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # an integer of too many digits, or an object whose repr is broken
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+
+
+def plain(name: str) -> str:
+    """Return a name that may be any text: as it is, or in quotes."""
+    return name if name.isidentifier() else shown(name)
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a real number; NaN and infinity are, True, False and integers beyond all floats are not."""
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, (float, np.integer, np.floating))
+
+
+def number(what: str, value: object, low: float = -math.inf, high: float = math.inf) -> None:
+    """Require a number strictly between ``low`` and ``high``."""
+    if not (is_number(value) and low < value < high):
+        bounds = "a finite number" if math.inf == high == -low else f"a number between {exact_text(low)} and {exact_text(high)}"
+        raise ProblemError(f"{what}: {shown(value)} must be {bounds}")
+
+
+def whole(what: str, value: object, low: int, high: int) -> None:
+    """Require a whole number from ``low`` to ``high``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+        raise ProblemError(f"{what}: {shown(value)} must be a whole number from {low} to {high}")
+
+
+def truth(what: str, value: object) -> None:
+    """Require True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ProblemError(f"{what}: {shown(value)} must be True or False")
+
+
+def instance(what: str, value: object, kind: type | tuple[type, ...], called: str) -> None:
+    """Require an object of a class; ``called`` names it in the message."""
+    if not isinstance(value, kind):
+        raise ProblemError(f"{what}: {shown(value)} must be {called}")
+
+
+def function(what: str, value: object) -> Callable[..., Any]:
+    """Require something that can be called, and return it."""
+    if not callable(value):
+        raise ProblemError(f"{what}: {shown(value)} must be a function")
+    return value
+
+
+def mapping(what: str, value: object, holds: str) -> Mapping[str, Any]:
+    """Require a mapping from names to what it ``holds``, and return it."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise ProblemError(f"{what}: {shown(value)} must be a dict from names to {holds}")
+    return value
+
+
+def sequence(what: str, value: object, holds: str) -> Sequence[Any]:
+    """Require a list, a tuple or an array of one dimension, and return it; text is none of them."""
+    array = isinstance(value, np.ndarray) and value.ndim == 1
+    if not array and (not isinstance(value, Sequence) or isinstance(value, (str, bytes))):
+        raise ProblemError(f"{what}: {shown(value)} must be a list of {holds}")
+    return cast(Sequence[Any], value)
+
+
+def names(what: str, value: object) -> tuple[str, ...]:
+    """Require a list of names, and return it as a tuple."""
+    found = tuple(sequence(what, value, "names"))
+    if not all(isinstance(name, str) for name in found):
+        raise ProblemError(f"{what}: {shown(value)} must be a list of names")
+    return found
+
+
+def chosen(what: str, value: object, known: Sequence[str]) -> tuple[str, ...]:
+    """Require different names among those that are known, and return them."""
+    found = names(what, value)
+    for name in found:
+        if name not in known:
+            raise ProblemError(f"{what}: {shown(name)} must be one of {listed(known) or 'none, as there are none here'}")
+        if found.count(name) > 1:
+            raise ProblemError(f"{what}: {plain(name)} is given twice")
+    return found
+
+
+def array(what: str, value: object, shape: tuple[int, ...]) -> Array:
+    """Require finite numbers of a shape, and return them as an array."""
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"{what}: {shown(value)} must be numbers") from None
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ProblemError(f"{what}: {shown(value)} must be {' x '.join(map(str, shape))} finite numbers")
+    return found
+
+
+# --- the arguments of a public function ---------------------------------------------------------------------------------------
+
+
+def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Return a public function that compares its arguments with its annotations before it runs.
+
+    A wrong one is a `ProblemError` that names it. What annotations do not say, the function itself checks.
+
+    Examples
+    --------
+    >>> @arguments
+    ... def half(number: float, times: int = 1) -> float:
+    ...     return number / 2**times
+    >>> half("three")
+    Traceback (most recent call last):
+    contin.errors.ProblemError: number: 'three' must be a number
+    """
+
+    @functools.wraps(function)
+    def checked(*given: _Given.args, **named: _Given.kwargs) -> _Result:
+        hints, names = _annotations(function)
+        for name, value in (*zip(names, given), *named.items()):
+            if said := _refusal(name, value, hints.get(name, Any)):
+                raise ProblemError(said)
+        return function(*given, **named)
+
+    return checked
+
+
+def fields(record: object) -> None:
+    """Require that the fields of a dataclass that were given are what their annotations say."""
+    hints, _ = _annotations(cast(Any, type(record)))
+    defaults = vars(type(record))
+    for name, value in vars(record).items():
+        given = name not in defaults or value is not defaults[name]
+        if given and (said := _refusal(name, value, hints.get(name, Any))):
+            raise ProblemError(said)
+
+
+@functools.cache
+def _annotations(annotated: object) -> tuple[dict[str, Any], Sequence[str]]:
+    """Return the types of the arguments of a function, and the names of those given by place; of a class those of fields."""
+    code = getattr(annotated, "__code__", None)
+    return typing.get_type_hints(annotated), code.co_varnames[: code.co_argcount] if code else ()
+
+
+#: What a value of a plain type is called, and whether a value is one.
+_PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    float: ("a number", is_number),
+    int: ("a whole number", lambda value: isinstance(value, (int, np.integer)) and not isinstance(value, bool)),
+    bool: ("True or False", lambda value: isinstance(value, (bool, np.bool_))),
+    str: ("a name", lambda value: isinstance(value, str)),
+    Path: ("a path", lambda value: isinstance(value, os.PathLike)),
+    Any: ("anything", lambda value: True),
+    object: ("anything", lambda value: True),
+}
+
+
+def _refusal(what: str, value: Any, kind: Any) -> str:
+    """Return why a value may not stand where an annotation is, "" if it may; an array is a list.
+
+    In lists and mappings the first entry that is wrong is named.
+    """
+    outer, inner = _parts(kind)
+    fits = True
+    inside: Iterator[str] = iter(())
+    if kind in _PLAIN:
+        fits = _PLAIN[kind][1](value)
+    elif outer in (typing.Union, types.UnionType):
+        others = [each for each in inner if each is not types.NoneType]
+        if value is not None and len(others) == 1:
+            return _refusal(what, value, others[0])
+        fits = any(value is None if each is types.NoneType else not _refusal(what, value, each) for each in inner)
+    elif outer is collections.abc.Callable:
+        fits = callable(value)
+    elif outer is collections.abc.Mapping:
+        fits = isinstance(value, Mapping) and not any(_refusal(what, name, inner[0]) for name in value)
+        inside = (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items()) if fits else inside
+    elif outer is np.ndarray:
+        fits = isinstance(value, (np.ndarray, list, tuple))
+    elif outer in (collections.abc.Sequence, tuple):
+        fixed = outer is tuple and inner[-1] is not ...
+        fits = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        fits = (fits or (isinstance(value, np.ndarray) and value.ndim == 1)) and (not fixed or len(value) == len(inner))
+        inside = (_refusal(what, *pair) for pair in zip(value, inner if fixed else [inner[0]] * len(value))) if fits else inside
+    else:
+        fits = isinstance(value, outer or kind)
+    return next(filter(None, inside), "") if fits else f"{what}: {shown(value)} must be {_words(kind)}"
+
+
+@functools.lru_cache(maxsize=256)
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return what an annotation is about, and what stands in its brackets."""
+    return typing.get_origin(kind), typing.get_args(kind)
+
+
+def _words(kind: Any) -> str:
+    """Return what may stand where an annotation is."""
+    outer, inner = _parts(kind)
+    if kind in _PLAIN:
+        return _PLAIN[kind][0]
+    if outer in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_words(each) for each in inner if each is not type(None)))
+    if outer is collections.abc.Callable:
+        return "a function"
+    if outer is collections.abc.Mapping:
+        return f"a dict from {_several(inner[0])} to {_several(inner[1])}"
+    if outer is np.ndarray:
+        return "an array"
+    if outer in (collections.abc.Sequence, tuple):
+        count = f"{len(inner)} " * (outer is tuple and inner[-1] is not ...)
+        return "a list" if inner[0] is Any else f"a list of {count}{_several(inner[0])}"
+    name = (outer or kind).__name__
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _several(kind: object) -> str:
+    return f"{_words(kind).partition(' ')[2]}s"

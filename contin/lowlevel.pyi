@@ -2,33 +2,31 @@
 from . import levels
 from .boundary.second_variation import Undetermined
 from .boundary.system import Collocation
-from .collocation.basis import basis, interpolation
+from .collocation.mesh import basis, interpolation
 from .continuation.run import Continuation
 from .core.labels import Label
 from .core.newton import correct
-from .core.state import State, Stop
+from .core.step import State, Stop
 from .core.trial import Trial
-from .equilibria.system import Algebraic
+from .equilibria.branches import Algebraic
 from .events.branch_point import BranchPoint, locate_branch_point
 from .events.error import error
 from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
-from .functions.cache import cache_directory
 from .functions.gradient import gradient
 from .functions.iteration import least, minimum, root
+from .functions.machine_code import cache_directory
 from .linalg.orientation import eigenbasis
-from .names import exact_text
-from .results.colours import PALETTE, Colour
 from .results.columns import StoredColumns, read_columns
-from .results.cubic import hermite, through
+from .results.curve import hermite, through
+from .results.marks import PALETTE, Colour
 from .results.phase_response import PhaseResponse
 from .results.point import point_of
 from .results.spectrum import Spectrum
-from .search.field_starts import oscillation
 from .search.further import Searched, further
-from .search.trace import follow
-from .shown import shown
+from .search.trace import follow, oscillation
+from .text import exact_text, shown
 
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",

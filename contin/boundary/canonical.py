@@ -23,16 +23,16 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.iteration import operands_of, search_of, solved
 from contin.functions.recorded_arrays import NUMPY
-from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import recorded_paths
+from contin.functions.stand_ins import RecordedFunction
 from contin.functions.tape import Number, Tape, Unrecordable
-from contin.shown import shown
+from contin.text import shown
 
 
 @dataclass(frozen=True)

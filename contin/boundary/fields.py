@@ -1,4 +1,11 @@
-"""Steady states of fields over one coordinate: boundary value problems of which some equations contain rates in time.
+"""Fields over one coordinate whose rates are given: their form, and their linearization in time.
+
+The characteristic matrix A - z B of a steady state of fields, and its forms: Re d / omega is the first Lyapunov coefficient.
+
+A and B are those of `contin.boundary.fields`: on the mesh B x' = F(x), so that w.B v = 1 of the critical vectors
+(`contin.events.normal_forms`). The mean of |v|^2 over the domain is one, of the states whose rates occur.
+
+Steady states of fields over one coordinate: boundary value problems of which some equations contain rates in time.
 
 With U' = rhs(t, U, p) + M U_t, where M (n, n) has entries in the rows of a few equations only, a perturbation that grows as
 exp(z t) solves, on the mesh of the steady state,
@@ -12,7 +19,7 @@ eigenvalues of the pair are infinite. With a shift s,
     T(s) = S (A - s B)^-1 P,        T(s) w = w / (z - s),
 
 has the finite ones alone. Of meshes that are not long T is formed, and all its eigenvalues are found; otherwise those right of
-the imaginary axis, or near to it, by Arnoldi's method (`contin.linalg.rightmost`).
+the imaginary axis, or near to it, by Arnoldi's method (`contin.linalg.matrices`).
 
 Collocation at Gauss points makes no unstable eigenvalues of its own: of u_t = u_xx it replaces exp(h sqrt z) over an interval h
 by a diagonal Pade approximant, which has the modulus 1 on the imaginary axis only, so that all z are negative on any mesh.
@@ -25,22 +32,85 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray, Function
-from contin.boundary.field_form import FieldForm
+from contin.arrays import Array, ComplexArray, Function, Numbers
 from contin.boundary.system import Collocation
 from contin.core.labels import Label
 from contin.core.spectral import Spectral
 from contin.core.trial import Event
-from contin.defining.hopf_curve import HopfCurve
+from contin.defining.critical import HopfCurve
 from contin.draws import generator
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
-from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
-from contin.events.normal_forms import at_special_point
+from contin.events.normal_forms import Coefficient, DenseForm, at_special_point
 from contin.levels import DEPENDENT, LOCATED
-from contin.linalg.rightmost import nearest_of, rightmost_of
+from contin.linalg.border import Borders
+from contin.linalg.matrices import SparseFactors, nearest_of, rightmost_of
+
+
+class FieldForm(DenseForm):
+    """That of a steady state of fields.
+
+    Parameters
+    ----------
+    system : Fields
+    x : ndarray, shape (size,)
+    """
+
+    def __init__(self, system: Any, x: Array) -> None:
+        pencil, held = system.pencil(x), system.size - system.equations
+        self._system, self._x, self._matrix, self._rates = system, x, pencil.matrix, pencil.into @ pencil.rates
+        self.places = np.append(np.arange(system.state_size), np.arange(system.state_size + held, system.size))
+        self.equations, self.weights = system.equations, system.weights[self.places]
+
+    def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> Any:
+        """Return LU factors of L(P)."""
+        from scipy.sparse import block_array, csc_array, kron  # type: ignore[import-untyped]  # .1 s
+
+        small = np.atleast_2d(coupling)
+        one = np.eye(len(small))
+        matrix = kron(one, self._matrix) - kron(small, self._rates)
+        if border is None:
+            return SparseFactors(csc_array(matrix))
+        columns, rows = (kron(one, csc_array(each[:, None])) for each in border)
+        return SparseFactors(csc_array(block_array([[matrix, columns], [rows.T, None]])), borders=len(small))
+
+    def coupled_parts(self, left: Numbers, right: Numbers) -> tuple[Numbers, Numbers]:
+        """Return w and B v."""
+        return left, (self._rates @ right.T).T
+
+    def coupled_gradient(self, left: Array, right: Array) -> Array:
+        """Return the derivatives of the sum of w.B v over the copies by x: coefficients of rates depend on parameters."""
+        system, wide = self._system, np.zeros(self._system.size)
+        found = np.zeros(system.size)
+        for w, v in zip(left, right):
+            wide[self.places] = v
+            found += system.rates_gradient(self._x, w, wide)
+        return found
+
+    def _along(self, stacks: Any) -> Array:
+        system = self._system
+        wide = [np.zeros((len(stack), system.size)) for stack in stacks]
+        for each, stack in zip(wide, stacks):
+            each[:, self.places] = stack
+        return np.array([system.along(self._x, parts) for parts in zip(*wide)])
+
+    def coupling(self, rate: complex) -> Any:
+        """Return the rate itself."""
+        return rate if rate.imag else rate.real
+
+    def unit(self, rate: complex) -> complex:
+        """Return one over the frequency."""
+        return 1j / rate
+
+    def length(self, right: Numbers) -> float:
+        """Return the root of the mean of |v|^2 over the states with rates, in the user's units."""
+        system, count = self._system, self._system.state_size
+        moving = np.tile(system.moving_states, count // len(system.moving_states))
+        squares = np.abs(right[:count] * system.unscaled_factors[:count]) ** 2
+        return float(np.sqrt((system.weights[:count] * squares) @ moving))
+
 
 #: Most rates at Gauss points for which T is formed: its eigenvalues take half a second then. Arnoldi's method takes 0.15 s of
 #: the Brusselator there, but ten seconds of the equation of Swift and Hohenberg.
@@ -143,7 +213,7 @@ class Fields(Spectral, Collocation):
 
         On curves the first free parameters are held; others, as multipliers or a speed, follow the states.
         """
-        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s
+        from scipy.sparse import csr_array  # .1 s
 
         n, points, rows = self._n, self.gauss_times.size, np.array(self.problem.rate_rows)
         free = self._free[self.size - self.equations :]

@@ -22,8 +22,8 @@ from contin.arrays import Array, ComplexArray, Function, Named
 from contin.boundary.statement import BoundaryValueProblem
 from contin.errors import ProblemError
 from contin.functions.signature import Signature, argument_count, named_values
-from contin.problems.own_names import PERIOD
-from contin.problems.vector_field import combined, returning
+from contin.problems.rewriting import combined, returning
+from contin.problems.statement import PERIOD
 
 #: Times of one period: five harmonics. The period of an oscillation of the Brusselator, 4 % beyond its Hopf point, has an error
 #: of 1e-4 then, of 1e-2 with 7 times and of 1e-5 with 15; the time grows as the square to the cube of their number.

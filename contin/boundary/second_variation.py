@@ -31,12 +31,12 @@ import numpy as np
 
 from contin.arrays import Array, Indices
 from contin.boundary.system import Collocation
-from contin.collocation.basis import interpolation
+from contin.collocation.mesh import interpolation
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
-from contin.events.index import Stability, nullity_of
+from contin.events.labelled import Stability, nullity_of
 from contin.levels import DEPENDENT, LOCATED, ROUGH
 from contin.linalg.orientation import canonical_basis
 

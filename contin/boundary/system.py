@@ -1,23 +1,583 @@
-"""A boundary value problem as the continuation sees it: its equations, meshes that suit, and what the statement knows."""
+"""Boundary value problems on a mesh: unknowns, equations, conditions, and what is known of their branches.
+
+The unknowns of a problem on a mesh: piecewise polynomials, the places where they are taken, and other meshes.
+
+On each of N intervals the solution is a polynomial of degree d through d + 1 Lobatto nodes, the end nodes shared.
+
+Orthogonal collocation at Gauss points on a mesh: the discrete equations, their Jacobian and higher derivatives.
+
+The polynomials satisfy the equation at the d Gauss points of each interval: error O(h^(2 d)) at the mesh points
+(superconvergence, de Boor & Swartz 1973). Integrals use the same Gauss points, so they converge as fast.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from typing import Self
+import threading
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 
-from contin.arrays import Array
-from contin.boundary.equations import BoundaryEquations
-from contin.collocation.corners import Selections, breaks_of, selections
-from contin.collocation.mesh import MeshControl, adapted_mesh, moved_to_breaks, near, with_breaks
-from contin.collocation.switching import NOWHERE, Switching, joined, switching
-from contin.core.protocol import Carrier
+from contin.arrays import Array, Indices, Places
+from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
+from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
+from contin.collocation.defect import Defect
+from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolation, moved_to_breaks, near, with_breaks
+from contin.collocation.newton import Values, Workspace, workspace
+from contin.collocation.projection import Projections, projections
+from contin.core.protocol import Carrier, Discretization
+from contin.core.system import Scales, System, largest_entries, usual
 from contin.core.trial import Event
+from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
-from contin.events.index import Stability
+from contin.events.labelled import Stability
+from contin.functions.batch import Batch, Columns
 from contin.levels import CORRECTED
+from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
+from contin.linalg.components import Around, Component, ComponentFactors, Part, components
+from contin.linalg.condensation import Factorization
+from contin.problems.statement import Statement
+
+#: What is computed when it is first asked for, and depends on the mesh.
+_ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies", "_spectra_found")
+
+
+class OnMesh(System):
+    """Unknowns on a mesh, and the free parameters behind them.
+
+    Attributes
+    ----------
+    mesh, nodes : ndarray, shapes (N + 1,) and (N d + 1,)
+        Mesh points and nodes.
+    gauss_times, gauss_weights : ndarray, shape (N d,)
+        Gauss points and weights of their quadrature.
+    """
+
+    problem: Any
+    plain = True
+
+    def __init__(
+        self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
+        scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, free, parameters, scales)
+        self.degree = self._d = degree
+        self.basis = basis(degree)
+        self.tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
+        self._n = len(self.problem.state_names)
+        self._take_mesh(np.array(mesh, dtype=float))
+
+    def _take_mesh(self, mesh: Array) -> None:
+        """Set all that depends on the mesh, and forget what was computed on another one."""
+        for name in _ON_A_MESH:
+            vars(self).pop(name, None)
+        problem, degree, h = self.problem, self.degree, mesh[1:] - mesh[:-1]
+        a, b = problem.domain
+        if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
+            raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
+        self.mesh, self._h, self.intervals = mesh, h, h.size
+        self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
+        self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
+        self._h_points = np.repeat(h, degree)[:, None]
+        self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
+        self.state_size = (self.intervals * degree + 1) * self._n
+        self.size = self.state_size + len(self.free)
+        self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
+        self.equations = self._conditions
+        node_weights = np.zeros(self.intervals * degree + 1)
+        np.add.at(node_weights, self._by_interval, (h[:, None] * self.basis.node_weights) / (b - a))
+        #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
+        self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
+
+    @property
+    def states_count(self) -> int:
+        """Number of states, n."""
+        return self._n
+
+    # --- values --------------------------------------------------------------------------------------------------
+
+    @property
+    def nodes(self) -> Array:
+        """Values of t at all nodes, shape (N d + 1,)."""
+        inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
+        return np.append(inner, self.mesh[-1])
+
+    def states(self, x: Array) -> Array:
+        """Return the states at the nodes, shape (N d + 1, n)."""
+        return self._scaled_states(x) * self.scales.states
+
+    def _scaled_states(self, x: Array) -> Array:
+        """Return the states divided by their sizes, a view of x."""
+        return x[: self.state_size].reshape(-1, self._n)
+
+    def at_gauss_points(self, x: Array) -> Array:
+        """Return the states divided by their sizes at the Gauss points, shape (N d, n)."""
+        points = np.empty((self.gauss_times.size, self._n))
+        at_points(self.basis.value, np.ascontiguousarray(x), points)
+        return points
+
+    def states_at_gauss_points(self, x: Array) -> Array:
+        """Return the states at the Gauss points in the user's units, shape (N d, n)."""
+        return self.at_gauss_points(x) * self.scales.states
+
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """Return the states at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
+        return self._interpolated(x, times) * self.scales.states
+
+    def _interpolated(self, x: Array, times: Array) -> Array:
+        """Return the piecewise polynomial of the values in x."""
+        return self._interpolator(times)(x)
+
+    def _interpolator(self, times: Array) -> Carrier:
+        """Return the function that evaluates the piecewise polynomial of values at times in the domain."""
+        j = np.minimum(np.maximum(np.searchsorted(self.mesh, times, side="right") - 1, 0), self.intervals - 1)
+        matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
+        places = self._by_interval[j]
+        return lambda x: np.einsum("ij,ijk->ik", matrix, self._scaled_states(x)[places])
+
+    def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:
+        """Return the states divided by their sizes at ``places`` (K,) of an interval, between 0 and 1, shape (K, n)."""
+        first = interval * self._d
+        matrix = interpolation(self.basis.nodes, self.basis.barycentric, places)
+        return matrix @ self._scaled_states(x)[first : first + self._d + 1]
+
+    def phase_row(self, reference: Array) -> Array:
+        """Return the row of the integral of u . v' over that of v' . v', shape (size,), for scaled states v at the nodes.
+
+        The integrals are taken at the Gauss points, with v' of the piecewise polynomial v; zero where v is constant.
+        """
+        row = np.zeros(self.size)
+        row /= fill_phase_row(self._n, self.tables, self._h, np.ascontiguousarray(reference).ravel(), row) or 1.0
+        return row
+
+    # --- the same on other meshes, with other parameters and sizes ------------------------------------------------
+
+    def carrier(self, other: Discretization) -> Carrier:
+        """Return the function that carries vectors of unknowns from this mesh to the mesh of another system."""
+        states = self._interpolator(other.nodes)
+        return self._between_scales(lambda x: np.concatenate([states(x).ravel(), x[self.state_size :]]), other)
+
+    def _copied(self, without: Sequence[str] = ()) -> Self:
+        """Return a copy with all that was computed, which ``copy.copy`` leaves out, but for what is to change."""
+        other = object.__new__(type(self))
+        vars(other).update({name: value for name, value in vars(self).items() if name not in without})
+        return other
+
+    def on_mesh(self, mesh: Places) -> tuple[Self, Carrier]:
+        """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""
+        other = self._copied()
+        other._take_mesh(np.array(mesh, dtype=float))
+        return other, self.carrier(other)
+
+    def refined(self) -> tuple[Self, Carrier]:
+        """Return the same problem with every interval halved, and the carrier."""
+        return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
+
+    def with_reference(self, x: Array) -> Self:
+        """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
+        return self
+
+    def _with(self, **changes: object) -> Self:
+        """Return the same with other free parameters, parameters or scales."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        given: dict[str, Any] = {"free": self.free, "parameters": values, "scales": self.scales, **changes}
+        return type(self)(self.problem, self.mesh, self.degree, **given)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the same problem with other values of parameters that are not free."""
+        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
+        """Return the same problem with other free parameters (values from x), on the same mesh, and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = self._with(free=free, parameters=values)
+        return other, other.pack(self.states(x), values)
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        rows = {name: np.ones(count) for name, count in self._rows}
+        scaled = self._with(scales=Scales(states, parameters, rows))
+        z = self.carrier(scaled)(x)
+        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
+        return self._with(scales=Scales(states, parameters, found)), z
+
+    def without_scales(self, x: Array) -> tuple[Self, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
+
+    @property
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """Those of boundary and integral conditions."""
+        return ("boundary", self.problem.boundary_size), ("integrals", self.problem.integral_size)
+
+    @abstractmethod
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of those rows."""
+
+
+#: Times, states, states at the other end and parameters at which functions are evaluated.
+_At = tuple[Array, Array, Array, Array]
+
+
+class BoundaryEquations(OnMesh):
+    """F(x) = 0 of a boundary value problem: collocation (scaled by h), boundary and integral conditions, in this order."""
+
+    #: Multipliers in a kernel, of cycles.
+    monodromy: Any = None
+
+    @functools.cached_property
+    def _layout(self) -> Layout:
+        return layout(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
+
+    @property
+    def order_of_states(self) -> Indices:
+        """The states in the order of the columns of a linearized system, shape (n,)."""
+        return self._layout.order
+
+    @functools.cached_property
+    def _columns(self) -> tuple[Columns, Columns]:
+        """Columns of field, by states in the layout's order, and of boundary; each by the free parameters, too."""
+        field, boundary = self.problem.batch("field"), self.problem.batch("boundary")
+        return field.columns(self._free, self._layout.order), boundary.columns(self._free)
+
+    @functools.cached_property
+    def _field(self) -> Batch:
+        """Right-hand side and integrands, compiled."""
+        return self._batch("field", ("states", "integrals"))
+
+    @functools.cached_property
+    def _boundary(self) -> Batch:
+        """Boundary conditions, compiled."""
+        return self._batch("boundary", ("boundary",))
+
+    @functools.cached_property
+    def _functionals(self) -> Batch:
+        """Functionals, with scaled inputs."""
+        return self._batch("functionals")
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """Right-hand side with integrands, and boundary conditions; in the user's units, too."""
+        return self._field, self._boundary, self.problem.batch("field"), self.problem.batch("boundary")
+
+    def _inside(self, x: Array) -> _At:
+        """Return where functions of t are evaluated: at the Gauss points."""
+        return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
+
+    def _inside_unscaled(self, x: Array) -> _At:
+        """Return the same in the user's units."""
+        return self.gauss_times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
+
+    def _at_ends(self, x: Array) -> _At:
+        """Return where boundary conditions are evaluated."""
+        u = self._scaled_states(x)
+        return _TIME, u[:1], u[-1:], self._scaled_parameters(x)
+
+    def evaluations(self, x: Array) -> list[tuple[Batch, Array, Array, Array, Array]]:
+        """Return right-hand side with integrands, and boundary conditions, in the user's units."""
+        ends = _TIME, self.states(x)[:1], self.states(x)[-1:], self.all_parameters(x)
+        return [(self.problem.batch("field"), *self._inside_unscaled(x)), (self.problem.batch("boundary"), *ends)]
+
+    def _both_ends(self, v: Array) -> Array:
+        """Return the states at both ends side by side, shape (1, 2 n)."""
+        return np.concatenate([v[: self._n], v[self.state_size - self._n : self.state_size]])[None]
+
+    # --- F and F_x -----------------------------------------------------------------------------------------------
+
+    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
+        residual = np.empty(self._conditions)
+        collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
+        return residual
+
+    def residual(self, x: Array) -> Array:
+        """Return the residual of the discrete equations at x, shape (equations,)."""
+        return self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
+
+    def _linearized(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Factors]:
+        """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
+        if self._components:
+            return self._factored_apart(x, Bordering(columns, rows))
+        residual, blocks = self._assembled(x, rows, columns)
+        return residual, Factorization(self._layout, blocks, self._segments(blocks.local.size))
+
+    def _segments(self, numbers: int) -> Share:
+        """Return the segments of a matrix with so many ``numbers`` in the blocks of all intervals."""
+        return share(self.intervals, numbers)
+
+    def _assembled(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Blocks]:
+        """Return the residual at x, and the blocks of that matrix."""
+        boundary, ends = self._boundary.jacobian(*self._at_ends(x), self._columns[1])
+        field, jacobian = self._field.jacobian(*self._inside(x), self._columns[0])
+        blocks = self._empty_blocks(len(rows), len(columns))
+        given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
+        run(assemble, given, self._segments(blocks.local.size), (True, False))
+        return self._residual(x, field, boundary), blocks
+
+    def _empty_blocks(self, rows: int, columns: int) -> Blocks:
+        """Return blocks for so many rows and columns around F_x."""
+        problem, n, d, k = self.problem, self._n, self._d, len(self.free) + columns
+        r, conditions, width = rows + problem.integral_size, problem.boundary_size, n * (d + 1) + k
+        return Blocks(
+            np.empty((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k)),
+            np.empty((conditions, n)), np.empty((conditions, n + k)),
+        )  # fmt: skip
+
+    @functools.cached_property
+    def _components(self) -> list[Component]:
+        """Parts of the states that meet at the ends only, where they are eliminated one by one; none where all are together."""
+        if self._n < _APART:
+            return []
+        found = components(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
+        return found if len(found) > 1 else []
+
+    @property
+    def separate_states(self) -> list[Indices]:
+        """The states in parts that meet at the ends only, as far as they are eliminated one by one."""
+        return [component.states for component in self._components] or [np.arange(self._n)]
+
+    def _factored_apart(self, x: Array, around: Bordering) -> tuple[Array, Factors]:
+        """Return the residual at x, and the same matrix factored component by component."""
+        n, (columns, rows) = self._n, around
+        boundary, (at_ends,) = self._boundary.jacobian(*self._at_ends(x), self.problem.batch("boundary").columns(self._free))
+        inside, of_field = self._inner, self.problem.batch("field").columns(self._free)
+        field, entries = self._field.entries(*self._inside(x), of_field)
+        points = columns[:, :inside].reshape(len(columns), self.gauss_times.size, n)
+        parts = [self._part(component, of_field, entries, points) for component in self._components]
+        integrals = np.empty((self.problem.integral_size, self.size))
+        for q, row in enumerate(integrals):
+            slopes = of_field.block(entries, np.array([n + q]), np.arange(of_field.width))[:, 0]
+            row[:] = self._to_nodes(self.gauss_weights[:, None] * slopes)
+        corner = np.concatenate([at_ends[:, 2 * n :], integrals[:, self.state_size :]])
+        corner = np.vstack([np.hstack([corner, columns[:, inside:].T]), rows[:, self.state_size :]])
+        states = np.concatenate([integrals[:, : self.state_size], rows[:, : self.state_size]])
+        factors = ComponentFactors(parts, Around(at_ends[:, :n], at_ends[:, n : 2 * n], states, corner))
+        return self._residual(x, field, boundary), factors
+
+    def _part(self, component: Component, of_field: Columns, entries: Array, columns: Array) -> Part:
+        """Return the rows of a component from the ``entries`` of the Jacobian, and ``columns`` (c, points, n) besides."""
+        n, states, points, k = self._n, component.states, self.gauss_times.size, len(self.free)
+        count = len(states)
+        jacobian = of_field.block(entries, states, states[component.layout.order])
+        places = np.unique(of_field.places[np.isin(of_field.rows, states) & (of_field.places >= n)])
+        by_parameters = -self._h_points[:, :, None] * of_field.block(entries, states, places)
+        slopes = np.concatenate([by_parameters, columns[:, :, states].transpose(1, 2, 0)], axis=2)
+        local, none = np.empty((self.intervals, count * self._d, count * (self._d + 1))), np.empty((0, 0))
+        border, ends = np.empty((self.intervals, 0, local.shape[2])), np.empty((0, count))
+        around = Bordering(np.empty((0, points * count)), np.empty((0, (points + 1) * count)))
+        given = component.layout, self.tables, self._h, jacobian, np.empty((1, 0, 2 * count)), around
+        assemble(*given, Blocks(local, border, none, ends, ends), share(self.intervals, 0))
+        return Part(component, local, slopes.reshape(points * count, -1), np.append(places - n, k + np.arange(len(columns))))
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+
+        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
+        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
+        """
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        return self._linearized(x, rows, columns)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
+        n, which = self._n, self._indices(names)
+        of_field, of_boundary = (self.problem.batch(name).columns(which, ()) for name in ("field", "boundary"))
+        field = self._field.jacobian(*self._inside(x), of_field)[1]
+        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
+        collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
+        return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,), for w (equations,)."""
+        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
+        entries, slopes = self._field.entries(*self._inside(x), of_field)[1], np.zeros((of_field.width, self.gauss_times.size))
+        np.add.at(slopes, of_field.places, (self._at_points(w)[:, of_field.rows] * entries).T)
+        ends = w[self._inner : self._inner + self.problem.boundary_size]
+        result = self._to_nodes(slopes.T, ends @ self._boundary.jacobian(*self._at_ends(x), of_ends)[1][0])
+        rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
+        np.add.at(result[: self.state_size].reshape(-1, self._n), self._by_interval, rates)
+        return result
+
+    @property
+    def _inner(self) -> int:
+        """Number of collocation conditions."""
+        return self.gauss_times.size * self._n
+
+    def _at_points(self, w: Array) -> Array:
+        """Return the weights of right-hand side and integrands at the Gauss points in w.F, shape (N d, n + n_int)."""
+        n = self._n
+        weights = np.empty((self.gauss_times.size, n + self.problem.integral_size))
+        weights[:, :n] = -self._h_points * w[: self._inner].reshape(-1, n)
+        weights[:, n:] = self.gauss_weights[:, None] * w[self._inner + self.problem.boundary_size : self._conditions]
+        return weights
+
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of the rows of boundary and integral conditions."""
+        of_field, of_boundary = self._columns
+        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
+        field = self._field.jacobian(*self._inside(x), of_field)[1][:, self._n :]
+        return {"boundary": np.abs(ends).max(axis=1, initial=0.0), "integrals": np.abs(field).max(axis=(0, 2), initial=0.0)}
+
+    # --- further derivatives -------------------------------------------------------------------------------------
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,); the part with u' is linear."""
+        n = self._n
+        field = self._field.along(*self._inside(x), [self._wide(v, self.at_gauss_points(v)) for v in directions])
+        boundary = self._boundary.along(*self._at_ends(x), [self._wide(v, self._both_ends(v)) for v in directions])[0]
+        return np.concatenate([-(self._h_points * field[:, :n]).ravel(), boundary, self.gauss_weights @ field[:, n:]])
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
+        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
+        inside, both = self._wide(v, self.at_gauss_points(v)), self._wide(v, self._both_ends(v))
+        ends = w[None, self._inner : self._inner + self.problem.boundary_size]
+        slopes = self._field.bent(*self._inside(x), self._at_points(w), inside, of_field)
+        return self._to_nodes(slopes, self._boundary.bent(*self._at_ends(x), ends, both, of_ends)[0])
+
+    def _to_nodes(self, slopes: Array, at_ends: Array | None = None) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k).
+
+        ``at_ends`` (2 n + k,) are further ones by the states at both ends and the free parameters.
+        """
+        n, by_points = self._n, slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        by_node = np.zeros((self.nodes.size, n))
+        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
+        result = np.append(by_node.ravel(), slopes[:, n:].sum(axis=0))
+        if at_ends is not None:
+            result[:n] += at_ends[:n]
+            result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
+            result[self.state_size :] += at_ends[2 * n :]
+        return result
+
+    # --- functionals ---------------------------------------------------------------------------------------------
+
+    @property
+    def integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are integrals, in the order of the compiled functions."""
+        return tuple(self.problem.functionals)
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals, in their order, by the same quadrature."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        return self.gauss_weights @ self.problem.batch("functionals").values(*self._inside_unscaled(x))
+
+    def integrands(self, x: Array, times: Array, points: Array) -> Array:
+        """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
+        batch: Batch = self.problem.batch("functionals")
+        return batch.values(times, points * self.scales.states, _NONE(self._n), self.all_parameters(x))
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,); None where they are not known."""
+        if name not in self.integrated:
+            return super().column_gradient(x, name)
+        batch, at = self._functionals, self.integrated.index(name)
+        slopes = batch.jacobian(*self._inside(x), batch.columns(self._free))[1][:, at]
+        return self._to_nodes(self.gauss_weights[:, None] * slopes)
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        if name not in self.integrated:
+            return super().column_bent(x, name, v)
+        batch, weights = self._functionals, np.zeros((self.gauss_times.size, len(self.integrated)))
+        weights[:, self.integrated.index(name)] = self.gauss_weights
+        wide = self._wide(v, self.at_gauss_points(v))
+        return self._to_nodes(batch.bent(*self._inside(x), weights, wide, batch.columns(self._free)))
+
+    # --- errors --------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def defect(self) -> Defect:
+        """What the estimates of errors on this mesh share."""
+        return Defect(self)
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
+        return self.defect.error(x, factors, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return self.defect.left_by_newton(x, self.residual(x), factors)
+
+    def scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        return self._scaled_parameters(x)
+
+    def field_values(self, times: Array, points: Array, p: Array) -> Array:
+        """Return right-hand side and integrands of conditions, shape (K, n + their number).
+
+        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; all are divided by their sizes, as are the values.
+        """
+        return self._field.values(times, points, _NONE(self._n), p)
+
+    # --- in one call of a kernel ---------------------------------------------------------------------------------
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where a kernel does not know them.
+
+        Zeros stand for those of `projections`.
+        """
+        return np.empty((0, self.size)), np.empty(0)
+
+    @property
+    def projections(self) -> Projections:
+        """The room in which a kernel evaluates projection conditions: here none."""
+        none, field = np.zeros((self._n, len(self.parameters))), self._field.load()
+        return projections(field, field, (0, 0), (none, none), self._free)
+
+    def fill_conditions(self, values: Values) -> int:
+        """Fill in what a kernel must know of the conditions beyond those of the problem; return how many there are."""
+        known = self.linear_conditions
+        assert known is not None
+        own = len(known[1])
+        values.rows[:own], values.targets[:own] = known
+        return own
+
+    @property
+    def workspace(self) -> Workspace | None:
+        """The arrays in which a kernel corrects points; None where Python evaluates functions, and on very long meshes."""
+        thread = threading.get_ident()
+        if thread not in self._workspaces:  # kernels of two threads run side by side
+            self._workspaces[thread] = self._made_workspace()
+        return self._workspaces[thread]
+
+    @functools.cached_property
+    def _workspaces(self) -> dict[int, Workspace | None]:
+        return {}
+
+    def _made_workspace(self) -> Workspace | None:
+        own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
+        if own is None or not recorded or self._components or not 0 <= self.size - self.equations <= 1:
+            return None
+        rows = len(own[0]) + self.size - self.equations
+        numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
+        return workspace(self, rows) if not is_large(numbers) else None
+
+    def unfilled_factors(self) -> Factorization:
+        """Return factors of the matrix of `workspace`, to be filled by a kernel."""
+        work = self.workspace
+        assert work is not None
+        return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0), work.mesh.whole)
+
+
+#: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
+#: than by one kernel, three the same, ten a twentieth of the time.
+_APART = 30
+#: The t of boundary conditions, which do not take it.
+_TIME = np.zeros(1)
+
+
+@functools.cache
+def _NONE(n: int) -> Array:
+    """Return the absent second state of a function of one point."""
+    return np.empty((0, n))
 
 
 class Collocation(BoundaryEquations):
@@ -171,3 +731,69 @@ class Collocation(BoundaryEquations):
     def index(self) -> Event | None:
         """That of the statement."""
         return self.problem.index
+
+
+class Conditioned(Collocation):
+    """A boundary value problem on a mesh, and further conditions, which come last in the residual.
+
+    Subclasses add the number of them to ``equations`` and say what they are.
+    """
+
+    @abstractmethod
+    def condition_values(self, x: Array) -> Array:
+        """Return the quantities that vanish besides, shape (q,)."""
+
+    @abstractmethod
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return them, and their derivatives by x, shape (q, size)."""
+
+    @abstractmethod
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return their derivatives by any parameters, shape (q, len(names))."""
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """None: they may depend on the unknowns in any way."""
+        return None
+
+    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
+        return np.zeros(self.equations - self._conditions)
+
+    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of their derivative along v, multiplied by w (q,), shape (size,); 0 where they are linear."""
+        return np.zeros(self.size)
+
+    def residual(self, x: Array) -> Array:
+        """Return the residual of the discrete equations at x, the further conditions last."""
+        return np.concatenate([super().residual(x), self.condition_values(x)])
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        values, own = self.conditions_with_rows(x)
+        if len(columns):
+            own = np.concatenate([own, columns[:, self._conditions :].T], axis=1)
+        inside = np.ascontiguousarray(columns[:, : self._conditions])
+        residual, factors = self._linearized(x, np.concatenate([own, rows]), inside)
+        return np.concatenate([residual, values]), factors
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
+        return np.vstack([super().parameter_columns(x, names), self.condition_columns(x, names)])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+        own = self.conditions_with_rows(x)[1]
+        return super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,)."""
+        return np.concatenate([super().along(x, directions), self.conditions_along(x, directions)])
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        return super().bent(x, w, v) + self.conditions_bent(x, w[self._conditions :], v)

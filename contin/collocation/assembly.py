@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.elimination import Range
-from contin.linalg.layout import Blocks, Layout
-from contin.linalg.segments import Share
 from contin.linalg.vector import address, scale_into
-from contin.shown import shown
+from contin.text import shown
 
 
 @kernel

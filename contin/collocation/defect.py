@@ -12,7 +12,7 @@ smooth functions; P is orthogonal to polynomials of lower degree, and so they ar
 4. [F_x; row] e = [g; 0]: the errors e at the mesh points, and of the free parameters. What g leaves out of the defect of w is
    smaller by h.
 
-Where a condition that the solution decides switches inside an interval (`contin.collocation.switching`), c is zero and the
+Where a condition that the solution decides switches inside an interval (`contin.collocation.corners`), c is zero and the
 projection is taken by a quadrature on either side of that place: the defect has a corner or a jump there.
 
 The estimate takes values of the functions at d + 2 points an interval, and one substitution. It holds where the error is small;
@@ -28,17 +28,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.collocation.basis import basis, interpolation
-from contin.collocation.mesh import near
-from contin.collocation.switching import Switching
-from contin.collocation.workspace import Codes, Values, Workspace, put_free
+from contin.collocation.corners import Switching
+from contin.collocation.mesh import basis, interpolation, near
+from contin.collocation.newton import Codes, Values, Workspace, put_free
 from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.levels import LOCATED
-from contin.linalg.condensation import Factored
-from contin.linalg.substitution import solve
-from contin.shown import shown
+from contin.linalg.condensation import Factored, solve
+from contin.text import shown
 
 
 class Finer(NamedTuple):

@@ -1,17 +1,105 @@
-"""Adaptation of the mesh: error density, equidistribution, number of intervals."""
+"""The mesh: nodes and interpolation on an interval, its degree, and adaptation to a solution."""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
-from contin.collocation.basis import Basis
 from contin.errors import ProblemError
 from contin.levels import CORRECTED
+from contin.text import shown
+
+DEGREES = range(2, 9)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Tables of one degree d on the unit interval.
+
+    ``nodes`` (d + 1,) Lobatto points and ``node_weights`` their quadrature; ``points`` (d,) Gauss points and
+    ``weights`` theirs; ``value`` and ``slope`` (d, d + 1) take nodal values to the Gauss points; ``highest`` (d + 1,)
+    gives the d-th derivative; ``barycentric`` (d + 1,) for interpolation; ``constant`` is max |prod (x - node)| / (d + 1)!.
+    """
+
+    degree: int
+    nodes: Array
+    node_weights: Array
+    points: Array
+    weights: Array
+    value: Array
+    slope: Array
+    highest: Array
+    barycentric: Array
+    constant: float
+
+    __repr__ = shown
+
+    @functools.cached_property
+    def runge_kutta(self) -> Array:
+        """The matrix of the Gauss method."""
+        return self.integrals(self.points)
+
+    def integrals(self, ends: Array) -> Array:
+        """Return the matrix (len(ends), d) that integrates values at the Gauss points from 0 to each of the ends."""
+        lagrange = 1 / np.prod(self.points[:, None] - self.points + np.eye(self.degree), axis=1)
+        return np.array([end * self.weights @ interpolation(self.points, lagrange, end * self.points) for end in ends])
+
+
+@functools.cache
+def basis(degree: int) -> Basis:
+    """Return the tables of a degree from 2 to 8.
+
+    Raises
+    ------
+    ProblemError
+
+    Examples
+    --------
+    >>> basis(2).nodes.tolist()
+    [0.0, 0.5, 1.0]
+    """
+    if degree not in DEGREES:
+        raise ProblemError(f"degree: {degree!r} must be a whole number from 2 to 8")
+    legendre = np.polynomial.legendre
+    points, weights = legendre.leggauss(degree)
+    top = np.zeros(degree + 1)
+    top[-1] = 1.0
+    nodes = np.concatenate([[-1.0], np.sort(legendre.legroots(legendre.legder(top)).real), [1.0]])
+    node_weights = 2 / (degree * (degree + 1) * legendre.legval(nodes, top) ** 2)
+    nodes, points = (nodes + 1) / 2, (points + 1) / 2
+    differences = nodes[:, None] - nodes + np.eye(degree + 1)
+    barycentric = 1 / differences.prod(axis=1)
+    value = interpolation(nodes, barycentric, points)
+    nodal_slope = barycentric / barycentric[:, None] / differences
+    np.fill_diagonal(nodal_slope, 0.0)
+    np.fill_diagonal(nodal_slope, -nodal_slope.sum(axis=1))
+    factorial = np.prod(np.arange(1.0, degree + 1))
+    fine = np.linspace(0, 1, 2001)
+    constant = np.abs((fine[:, None] - nodes).prod(axis=1)).max() / (factorial * (degree + 1))
+    tables = (nodes, node_weights / 2, points, weights / 2, value, value @ nodal_slope, factorial * barycentric, barycentric)
+    return Basis(degree, *tables, constant)
+
+
+def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
+    """Return the matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes at points (barycentric form).
+
+    Examples
+    --------
+    >>> table = basis(2)
+    >>> interpolation(table.nodes, table.barycentric, np.array([0.25])) @ table.nodes**2  # exact for polynomials of degree 2
+    array([0.0625])
+    """
+    distance = at[:, None] - nodes
+    exact = distance == 0
+    terms = barycentric / np.where(exact, 1.0, distance)
+    matrix = terms / terms.sum(axis=1, keepdims=True)
+    return np.where(exact.any(axis=1, keepdims=True), exact, matrix)
+
 
 #: More intervals than any machine has room for: a bound for what users give.
 MOST_INTERVALS = 1_000_000
@@ -213,3 +301,39 @@ def _shared_out(parts: Array, total: int) -> Any:
         else:
             counts[np.argmax(missing)] += 1
     return counts
+
+
+#: Degrees among which is chosen, and those that they are compared with. Meshes of degree 8 are made from the eighth derivative,
+#: whose round-off often gives them as many intervals as degree 7 has. Degrees below 4 need many intervals wherever they are not
+#: the cheapest.
+_CHOSEN, _COMPARED = range(4, 8), range(4, 9)
+#: That of cycles. At degree 7 the mesh has fewer intervals, which suit the cycle but not its multipliers: in AUTO's demos their
+#: errors are 1e-8 to 1e-6 in place of 1e-9.
+CYCLE_DEGREE = 4
+#: Solutions are considered from one for which every degree has the fewest intervals to one that needs so many times as many.
+#: Ten times more changes no degree.
+_HARDEST = 1e4
+#: Time that a Newton iteration takes for an interval, over that for its Python code (1 ms; docs/performance.md, cost laws). Ten
+#: times less, the degree at 1e-12 would be 7 for more than 30 states instead of up to 12.
+_INTERVAL = 3e-3
+#: The same for each of the (n d)^2 entries of an interval's block. Ten times more, the degree would be 7 for up to 3 states.
+_ENTRY = 7.5e-6
+
+
+@functools.cache
+def usual_degree(states: int, tolerance: float) -> int:
+    """Return the degree for n states and a tolerance that is never far from the cheapest one, whatever the solution is.
+
+    A Newton iteration on N intervals of degree d takes the time a + N (b + c (n d)^2). A solution whose density has the
+    integral K needs N = K / share(d) intervals, but no fewer than some number. Many states and easy solutions (small K) want a
+    low degree, few states and difficult solutions a high one. K is not known before the solution is. The result is the degree
+    whose time, divided by that of the cheapest degree, is smallest at the K that is worst for it. That quotient is below 2 for
+    tolerances from 1e-12 and any number of states, and below 1.6 for fewer than 20 states.
+    """
+    shares = {d: share(basis(d), tolerance) for d in _COMPARED}
+    fewest = 2 * MeshControl.min_intervals  # of special points
+    easiest = fewest * min(shares.values())
+    integrals = np.geomspace(easiest, _HARDEST * easiest)
+    times = {d: 1 + (_INTERVAL + _ENTRY * (states * d) ** 2) * np.maximum(fewest, integrals / shares[d]) for d in _COMPARED}
+    cheapest = np.min(list(times.values()), axis=0)
+    return min(_CHOSEN, key=lambda d: float((times[d] / cheapest).max()))

@@ -24,8 +24,7 @@ from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import MOST_UPDATES
-from contin.linalg.small import factor_small, solve_small
-from contin.linalg.spectrum import fill_eigenvalues
+from contin.linalg.small import factor_small, fill_eigenvalues, solve_small
 
 #: An update of Y below this is the last: the next would be its square. Ten times larger, 1e-16 would be lost.
 _SETTLED = 1e-9

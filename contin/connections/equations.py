@@ -11,20 +11,18 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
-from contin.boundary.conditions import Conditioned
+from contin.boundary.system import Conditioned
 from contin.collocation.mesh import MeshControl
+from contin.collocation.newton import Values
 from contin.collocation.projection import Projections, projections
-from contin.collocation.workspace import Values
-from contin.core.multilinear import Numbers, alike, classes, shares, subsets
+from contin.core.differences import Numbers, alike, classes, shares, subsets
 from contin.core.protocol import Carrier
-from contin.core.scales import Scales
 from contin.core.spectral import KEPT
-from contin.core.system import System
+from contin.core.system import Scales, System
 from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.levels import APART
-from contin.linalg.factors import Factors
-from contin.linalg.segments import Share, share
+from contin.linalg.blocks import Factors, Share, share
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.statement import Statement
 
@@ -223,7 +221,7 @@ class ConnectionEquations(Conditioned):
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along subsets of the directions.
 
-        Of subsets that stand for the same directions only the first is there (`contin.core.multilinear.alike`).
+        Of subsets that stand for the same directions only the first is there (`contin.core.differences.alike`).
         """
         batch, sizes = self.problem.batch("vector field"), self.scales.states
         place = self._places(p[None])[end]

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
-from contin.connections.system import ConnectionCollocation
-from contin.core.scales import Scales
+from contin.connections.branches import ConnectionCollocation
+from contin.core.system import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, named_values
 from contin.problems.angles import Angles, angle_periods, check_periodic, winding_names
-from contin.problems.own_names import TIME
-from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, returning, scaled
+from contin.problems.rewriting import check_field, found_elsewhere, returning, scaled
+from contin.problems.statement import TIME, check_statement
 
 
 class ConnectionProblem(BoundaryValueProblem):

@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from contin.continuation.notes import Notes
+from contin.continuation.points import Notes
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
-from contin.core.state import Reason, State, Stop
-from contin.core.step import aims, corrected, judged, predict
+from contin.core.step import Reason, State, Stop, aims, corrected, judged, predict
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.levels import BESIDE, MOST_STEPS
-from contin.names import exact_text
+from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
 _STANDING = 6

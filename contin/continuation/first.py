@@ -8,20 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.meshes import ATTEMPTS, finer, is_poor
+from contin.continuation.meshes import ATTEMPTS, accuracy_of, finer, is_poor
 from contin.continuation.scaling import renewed, scaled
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
-from contin.core.settling import ROUNDS
-from contin.core.state import Reason, State, Stop, standing_at
+from contin.core.step import ROUNDS, Reason, State, Stop, standing_at
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.draws import DRAWS, generator
 from contin.errors import ConvergenceError
-from contin.events.accuracy import accuracy_of
-from contin.events.significance import growing
+from contin.events.folds import growing
 from contin.levels import APART, LOCATED
-from contin.names import value_names
+from contin.text import value_names
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 ROUNDS_OF_MESHES = 4

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.collocation import one_call
+from contin.collocation import newton as one_call
 from contin.collocation.defect import estimate, estimate_of
 from contin.continuation.plain import Quotient, Rooms, plain_steps
 from contin.continuation.plain_on_mesh import (
@@ -30,7 +30,7 @@ from contin.continuation.plain_on_mesh import (
     multipliers_ask,
     rests,
     step_on_mesh,
-)
+)  # fmt: skip
 from contin.continuation.rules import (
     ARCLENGTH,
     CLOSES,
@@ -49,20 +49,18 @@ from contin.continuation.rules import (
     Frame,
     Path,
     Watch,
-)
+)  # fmt: skip
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
-from contin.core.state import State
-from contin.core.step import SUMS, aims
+from contin.core.step import SUMS, State, aims
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.crossings import changes_little
-from contin.events.inspection import Start, free_of, returned
-from contin.events.significance import STILL
+from contin.events.folds import STILL
+from contin.events.inspection import Start, crossed, free_of, jumped, returned
 from contin.events.spectra import spectra_of
-from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factored, Factorization
 from contin.linalg.ends import Relations
 from contin.results.point import Point

@@ -1,4 +1,4 @@
-"""The mesh of a run: adapted now and then, finer where a point is not good enough, coarser where it is better than needed."""
+"""The mesh of a run: the error of a point, a finer mesh where it is too large, a coarser one where it is small."""
 
 from __future__ import annotations
 
@@ -6,24 +6,74 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.collocation.mesh import MeshControl
-from contin.continuation.notes import unsettled
+from contin.continuation.points import unsettled
 from contin.continuation.scaling import outgrown
 from contin.continuation.steps import Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
-from contin.core.state import State
-from contin.core.step import Judgement, trial_of
+from contin.core.step import Judgement, State, trial_of
 from contin.core.trial import Event, Trial
+from contin.draws import generator
 from contin.errors import ConvergenceError
-from contin.events.accuracy import Accuracy, accuracy_of
 from contin.events.arc import Arc
-from contin.events.trivial import jumped
+from contin.events.inspection import jumped
+from contin.levels import CERTAIN
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The estimated discretization error of a point, relative to 1 + size; NaN where it is not known, 0 without a mesh."""
+
+    error: float
+    trial: Trial | None = None
+
+    @functools.cached_property
+    def is_round_off(self) -> bool:
+        """A finer mesh would not make it smaller."""
+        trial = self.trial
+        return trial is not None and self.error <= CERTAIN * trial.system.newton_error(trial.x, trial.factors)
+
+
+def accuracy_of(trial: Trial) -> Accuracy:
+    """Return the estimated discretization error of a point of a curve."""
+    return Accuracy(trial.discretization_error, trial)
+
+
+class _Bordered:
+    """Factors of [[F_x, c], [row, 0], [r, 0]] at a simple branch point, for right-hand sides of [F_x; row]."""
+
+    def __init__(self, trial: Trial) -> None:
+        system, random = trial.system, generator("accuracy")
+        self._size = system.size
+        rows = np.zeros((2, system.size + 1))
+        rows[0, :-1] = system.weights * trial.tangent
+        rows[1, :-1] = system.weights * random.standard_normal(system.size)
+        column = random.standard_normal((1, system.equations)) / np.sqrt(system.equations)
+        self._factors = system.linearize(trial.x, rows, column)[1]
+
+    def solve(self, b: Array) -> Array:
+        """Return the unknowns."""
+        return self._factors.solve(np.append(b, 0.0))[: self._size]
+
+
+def at_branch_point(trial: Trial) -> Accuracy:
+    """Return the estimated error of a branch point from which a run starts, without the part in the kernel of F_x.
+
+    A cycle of no size, as that at a Hopf point, is the same on every mesh.
+    """
+    system = trial.system
+    if not system.intervals or (system.size_of_solutions is not None and not np.ptp(system.states(trial.x), axis=0).any()):
+        return Accuracy(0.0)
+    factors: Any = _Bordered(trial)
+    return Accuracy(system.discretization_error(trial.x, factors, trial.functionals))
+
 
 #: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
 #: equations inside an interval, meshes would grow without end.

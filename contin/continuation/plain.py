@@ -1,6 +1,6 @@
 """Plain steps of small problems without a mesh: one call of a kernel makes many, up to the first that asks for a closer look.
 
-Each is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.watch`. Where an
+Each is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.inspection`. Where an
 entry of the watch list asks, or round-off would have to decide, the call ends before the step, and the run makes it.
 """
 
@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from contin.continuation import rules
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.core.scales import USUAL
 from contin.core.small import (
     BELIEVED,
     ERROR,
@@ -23,15 +22,15 @@ from contin.core.small import (
     correct_point,
     evaluate_slopes,
     fill_matrix,
-)
+)  # fmt: skip
+from contin.core.system import USUAL
 from contin.events.arc import LEAST_COSINE
 from contin.events.crossings import CALM, NEAR_ONE
 from contin.events.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper
 from contin.linalg.ends import is_near_one
-from contin.linalg.small import solve_small
-from contin.linalg.spectrum import fill_eigenvalues
+from contin.linalg.small import fill_eigenvalues, solve_small
 
 
 class Quotient(NamedTuple):

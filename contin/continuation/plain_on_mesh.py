@@ -1,6 +1,6 @@
 """A plain step on a mesh: what kernels make and compare of it.
 
-It is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.watch`. Each of these
+It is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.inspection`. Each of these
 kernels is called once a step; `contin.continuation.lane` ends where one of them asks for a closer look.
 """
 
@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 from contin.arrays import Array
-from contin.collocation import one_call
-from contin.collocation.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
-from contin.collocation.workspace import Mesh, Workspace
+from contin.collocation import newton as one_call
+from contin.collocation.newton import Mesh, Workspace
+from contin.collocation.round import KNOWN, Monodromy, fill_multipliers, nearest_to_one
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
@@ -20,7 +20,7 @@ from contin.core.newton import STAGNANT
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import COLLAPSED
 from contin.events.crossings import TURN
-from contin.events.nearness import AS_FAR
+from contin.events.dips import AS_FAR
 from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, Vector, helper

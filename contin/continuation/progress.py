@@ -7,13 +7,13 @@ import time
 from collections.abc import Iterator
 from typing import TextIO
 
-from contin import checks
+from contin import errors as checks
 from contin.continuation.run import Continuation
-from contin.core.state import Reason, Stop
+from contin.core.step import Reason, Stop
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.shown import WIDTH
+from contin.text import WIDTH
 
 #: Seconds before a line is shown, and between two of them: calls that are done at once show none, and the terminal is not
 #: flooded.

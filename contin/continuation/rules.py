@@ -1,6 +1,6 @@
 """The rules of a plain step inside kernels: predicted, judged, watched, accepted, whatever the equations are.
 
-They are those of `contin.continuation.steps` and `contin.events.watch`. Points stand one by one in a `Path`.
+They are those of `contin.continuation.steps` and `contin.events.inspection`. Points stand one by one in a `Path`.
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, missed_of, turned, up_to
-from contin.events.folds import dips, ends_low
+from contin.events.folds import STANDS, dips, ends_low
 from contin.events.inspection import FEWEST, REACH, misses
-from contin.events.significance import STANDS
 from contin.functions.kernel_parts import IndexVector, Matrix, Vector, helper
 
 #: Round-off of Newton's method above the tolerance is noted from this error on: ten times smaller, runs in small units that

@@ -19,29 +19,24 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.continuation.failure import ended, met, no_convergence, runs_away, shorter_steps
-from contin.continuation.findings import IndexChange, index_changes, is_confirmed, located_again, told
 from contin.continuation.first import begins_outside, corrected_first, on_branch
-from contin.continuation.judge import Judge
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
-from contin.continuation.meshes import MeshPolicy, Moved
-from contin.continuation.notes import Notes
+from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
+from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told
 from contin.continuation.rules import NOISY
-from contin.continuation.steps import Step, Steps
+from contin.continuation.steps import Judge, Step, Steps
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
-from contin.core.state import Reason, State, Stop
-from contin.core.step import predict, up_to_limits
+from contin.core.step import Reason, State, Stop, predict, up_to_limits
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
-from contin.events.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.events.arc import Arc, SpecialPoint, with_details
-from contin.events.extrema import extremum
 from contin.events.inspection import Start
-from contin.events.usual import fold, limits, user_zeros, within_limits
+from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.levels import ROUGH
-from contin.names import exact_text
 from contin.results.point import Point
+from contin.text import exact_text
 
 
 class Continuation:

@@ -15,7 +15,7 @@ large as a state whose small value is more than nothing, since F_x would be sing
 
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
-from one count (`contin.core.scales`).
+from one count (`contin.core.system`).
 """
 
 from __future__ import annotations
@@ -31,13 +31,12 @@ from contin import draws
 from contin.arrays import Array, Pattern
 from contin.core.newton import UNITS, Newton, rounded_off
 from contin.core.protocol import Carrier, Discretization
-from contin.core.scales import USUAL, usual
 from contin.core.settings import Settings
-from contin.core.system import System
+from contin.core.system import USUAL, System, usual
 from contin.core.trial import Linearization, Trial
-from contin.events.significance import on_finer_mesh
+from contin.events.folds import on_finer_mesh
 from contin.levels import APART, CORRECTED, DOUBLED, ROUGH
-from contin.linalg.layout import MANY
+from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
 #: Iterations of the power method, and largest Krylov space that parts close eigenvalues. Sizes are powers of two: the distance

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks, draws
+from contin import draws
+from contin import errors as checks
 from contin.arrays import Array
-from contin.collocation.one_call import (
+from contin.collocation.newton import (
     CLOSE,
     CONVERGED,
     ERROR,
@@ -27,24 +28,16 @@ from contin.collocation.one_call import (
     STAGNATES,
     UPDATES,
     Control,
+    Workspace,
     correct_on_mesh,
-)
-from contin.collocation.workspace import Workspace
+)  # fmt: skip
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError
 from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
+from contin.linalg.blocks import Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.convergence import (
-    CHORDS,
-    diverges,
-    estimated_rate,
-    has_converged,
-    stagnates,
-    subtract,
-    wants_jacobian,
-)
-from contin.linalg.factors import Factors
-from contin.shown import shown
+from contin.linalg.convergence import CHORDS, diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
+from contin.text import shown
 
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.

@@ -12,11 +12,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from contin.arrays import Array
+from contin.collocation.corners import NOWHERE, Switching
 from contin.collocation.mesh import MeshControl
-from contin.collocation.switching import NOWHERE, Switching
-from contin.core.differences import derivative
-from contin.core.multilinear import of_lines
-from contin.linalg.factors import Factors
+from contin.core.differences import derivative, of_lines
+from contin.linalg.blocks import Factors
 from contin.problems.statement import Statement
 
 #: Takes vectors of unknowns from one discretization of a problem to another.

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypedDict
 
-from contin import checks, threads
+from contin import errors as checks
+from contin import threads
 from contin.collocation.mesh import MeshControl
 from contin.core.newton import Newton
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
 from contin.errors import ProblemError, warn
-from contin.names import exact_text
+from contin.text import exact_text
 
 
 @dataclass(frozen=True)

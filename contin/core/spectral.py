@@ -1,12 +1,23 @@
-"""Eigenvalues of the linearization in time, kept for the places that were asked for last."""
+"""Eigenvalues of the linearization in time, and which lie on the imaginary axis or the unit circle up to round-off.
+
+Eigenvalues that lie on the imaginary axis, and multipliers on the unit circle, as far as round-off lets one tell.
+
+In a conservative system pairs stay there, and a second multiplier of cycles is one. Round-off moves them to either side. How
+far is seen by rounding what they are computed from once more, up or down by chance: they change by their round-off.
+"""
 
 from __future__ import annotations
 
 import functools
+import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from contin.arrays import Array, ComplexArray
+import numpy as np
+
+from contin import draws
+from contin.arrays import Array, ComplexArray, Mask
+from contin.levels import APART, CERTAIN, CORRECTED, LOCATED
 
 #: Results at points, as sets of eigenvalues, that are kept: more than a search for Hopf points compares.
 KEPT = 64
@@ -65,3 +76,51 @@ class Spectral:
         if key not in self._spectra_found:
             self._keep(key, self.spectra([x])[0])
         return self._spectra_found[key]
+
+
+def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: ComplexArray, full: float = math.inf) -> Array:
+    """Return the largest change of each of some eigenvalues when what they are computed from is rounded, up or down.
+
+    ``again(signs)`` computes them again; ``signs(array)`` are random signs of the shape of an array. Imaginary parts are alike
+    up to multiples of ``full``.
+    """
+    random, found = draws.generator("rounding"), np.zeros(len(values))
+    for _ in range(draws.DRAWS):
+        gaps = values[:, None] - again(lambda array: draws.signs(random, array))
+        imaginary = gaps.imag if full == math.inf else (gaps.imag + full / 2) % full - full / 2
+        found = np.maximum(found, np.hypot(gaps.real, imaginary).min(axis=1))
+    return found
+
+
+def changes_of_multipliers(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: ComplexArray) -> Array:
+    """Return the largest change of the logarithms of multipliers at x when x is rounded."""
+    return changes(lambda signs: eigenvalues(x + np.finfo(float).eps * (1 + np.abs(x)) * signs(x)), values, full=2 * math.pi)
+
+
+def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: ComplexArray, expected: int = 0) -> Mask:
+    """Return which multipliers lie on the unit circle, up to round-off, from their logarithms ``values`` at x.
+
+    Where no more than ``expected`` come near it, these are not looked at.
+    """
+    near = np.abs(values.real) < APART
+    if np.count_nonzero(near) <= expected:
+        return np.zeros(len(values), dtype=bool)
+    bound = np.full(len(values), CORRECTED)
+    if np.any(near & (np.abs(values.real) > CORRECTED)):
+        bound = np.maximum(bound, CERTAIN * changes_of_multipliers(eigenvalues, x, values))
+    return near & (np.abs(values.real) <= bound)
+
+
+def may_be_on_axis(values: ComplexArray) -> Mask:
+    """Return which eigenvalues are complex and so near to the axis that round-off decides; of matrices, shape (..., n)."""
+    sizes = np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
+    return (np.abs(values.real) < LOCATED * sizes) & (values.imag != 0) & (values.real != 0)
+
+
+def off_axis(eigenvalues: Callable[[Array], ComplexArray], matrix: Array, values: ComplexArray) -> ComplexArray:
+    """Return the eigenvalues ``values`` of a matrix, with the real part 0 for pairs on the axis up to round-off."""
+    near = may_be_on_axis(values)
+    if not near.any():
+        return values
+    error = changes(lambda signs: eigenvalues(matrix * (1 + np.finfo(float).eps * signs(matrix))), values)
+    return np.where(near & (np.abs(values.real) <= CERTAIN * error), 1j * values.imag, values)

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array, Numbers
 from contin.core.protocol import Discretization, inner
-from contin.linalg.factors import Factors
-from contin.shown import shown
+from contin.linalg.blocks import Factors
+from contin.text import shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class Trial:
 
     @property
     def settled(self) -> Trial:
-        """The same point on a mesh with points where conditions on states switch (`contin.core.settling`)."""
+        """The same point on a mesh with points where conditions on states switch (`contin.core.step`)."""
         return self._settled or self
 
     @settled.setter

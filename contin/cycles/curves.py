@@ -1,4 +1,6 @@
-"""Defining systems of curves of period doublings and torus bifurcations, of cycles and of cycles of maps, in two parameters.
+"""Curves of folds, period doublings and torus bifurcations of cycles in two parameters.
+
+Defining systems of curves of period doublings and torus bifurcations, of cycles and of cycles of maps, in two parameters.
 
 A perturbation is multiplied in a round by an eigenvalue of P. It is -1 at a period doubling. At a torus bifurcation, with
 kappa = cos(theta) and the perturbation v_1 + i sin(theta) v_2,
@@ -23,14 +25,15 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
+from contin.cycles.equations import PeriodicEquations
+from contin.cycles.map_equations import MapEquations
 from contin.cycles.normal_forms import MOST
-from contin.defining.critical_curve import CriticalCurve, degenerate
-from contin.defining.fold_curve import FoldCurve
+from contin.defining.critical import CriticalCurve, degenerate, signed_smallest
+from contin.defining.special_points import FoldCurve
 from contin.events.arc import Arc, SpecialPoint
-from contin.events.coefficient import UNKNOWN, Coefficient
 from contin.events.interpolated import meeting
-from contin.events.normal_forms import coefficient, flip, pair
-from contin.levels import APART, ROUGH
+from contin.events.normal_forms import UNKNOWN, Coefficient, coefficient, flip, pair
+from contin.levels import APART, CORRECTED, ROUGH, ROUND_OFF
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
@@ -191,3 +194,29 @@ def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[
     """
     stops = f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image"
     return meeting(arc, test, (_change, distance), _NEAR, stops)
+
+
+def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
+    """Return the test functions of points where a further multiplier is one, or another is -1.
+
+    The change of g with the multiplier vanishes where a further one is one.
+    """
+    autonomous, noise = cycles.autonomous, NORMAL if cycles.intervals else ROUND_OFF
+    critical = 1 + autonomous
+
+    def further(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w = system.null_vectors(trial.x)
+        n = len(system.problem.states)
+        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
+
+    def flip(trial: Trial) -> float:
+        system: Any = trial.system
+        exponents = system.base.eigenvalues(trial.x)
+        others = exponents[np.argsort(np.abs(exponents))[critical:]]
+        size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
+        multipliers = np.exp(others - size)
+        multipliers.imag[np.abs(multipliers.imag) <= CORRECTED * np.abs(multipliers)] = 0.0
+        return signed_smallest(np.exp(-size) + multipliers)
+
+    return [Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]

@@ -12,27 +12,22 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
-from contin.boundary.conditions import Conditioned
-from contin.boundary.system import Collocation
+from contin.boundary.system import Collocation, Conditioned
 from contin.collocation.corners import breaks_of
-from contin.collocation.extremes import extremes
 from contin.collocation.mesh import MeshControl
-from contin.collocation.monodromy import COARSE, DRIFTED, Monodromy, fill_multipliers, monodromy_of, resolving
+from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
 from contin.core.protocol import Carrier
-from contin.core.rounding import on_circle
-from contin.core.scales import Scales
-from contin.core.spectral import KEPT
+from contin.core.spectral import KEPT, on_circle
+from contin.core.system import Scales
 from contin.draws import ASIDE
 from contin.errors import ProblemError
 from contin.functions.batch import Columns
 from contin.levels import APART, DOUBLED, LOCATED
+from contin.linalg.blocks import Blocks, Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.factors import Factors
-from contin.linalg.layout import Blocks
-from contin.linalg.periodic import log_eigenvalues_along
-from contin.linalg.transitions import interval_matrices
+from contin.linalg.periodic import interval_matrices, log_eigenvalues_along
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
-from contin.problems.own_names import PERIOD, rounds_of
+from contin.problems.statement import PERIOD, rounds_of
 
 #: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
 _SPLIT = 100.0

@@ -22,21 +22,20 @@ from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization
-from contin.core.rounding import changes_of_multipliers
-from contin.core.state import Reason, Stop
+from contin.core.spectral import changes_of_multipliers
+from contin.core.step import Reason, Stop
 from contin.core.trial import Event, Trial, sign_changed
+from contin.cycles.ends import is_still
 from contin.cycles.equations import PeriodicEquations
-from contin.cycles.homoclinic import is_still
 from contin.cycles.map_equations import MapEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
+from contin.events.dips import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near, separated
+from contin.events.folds import on_finer_mesh
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import finding_of, frequency_of
-from contin.events.nearness import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.normal_forms import flip, pair
 from contin.events.refinement import ASIDE
-from contin.events.significance import on_finer_mesh
-from contin.events.zeros import separated
 from contin.levels import LOCATED
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times

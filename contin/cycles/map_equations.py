@@ -8,17 +8,17 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
-from contin.core.rounding import on_circle
-from contin.core.scales import Scales
+from contin.core.spectral import on_circle
+from contin.core.system import Scales
 from contin.cycles.equations import is_opposite, is_pair
 from contin.equilibria.equations import AlgebraicEquations
-from contin.events.nearness import NO_MULTIPLIER
+from contin.events.dips import NO_MULTIPLIER
 from contin.functions.batch import Batch
 from contin.levels import DOUBLED
-from contin.linalg.layout import MANY
+from contin.linalg.blocks import MANY
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
-from contin.problems.own_names import ROUNDS, rounds_of
+from contin.problems.statement import ROUNDS, rounds_of
 
 
 class MapEquations(AlgebraicEquations):

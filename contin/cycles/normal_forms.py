@@ -1,7 +1,39 @@
-"""The characteristic matrices of cycles, and of cycles of maps, and their forms (`contin.events.normal_forms`).
+"""Normal forms of cycles, and of cycles of maps: the linearization over one round, and their characteristic matrices.
+
+The linearization of a cycle over one round, with any condition between its ends.
+
+With a symmetry S of the cycle a round is one n-th of the period, and E0 in the conditions stands for S E0.
+
+Collocated, v' = T F_u v has the rows C v = 0. With v(1) = P v(0) for several copies of v that the small matrix P couples (or
+one copy with the number P), a perturbation is multiplied by an eigenvalue of P in each round:
+
+                        v_1      a_1      v_2      a_2
+                     [ C        -h F                      ]    collocation; a_i is a change of the period
+                     [ E1 - P11 E0       -P12 E0          ]    v_1(1) = P11 v_1(0) + P12 v_2(0)
+                     [ e                                  ]    e.v_1(0) = 0, with e along the cycle at t = 0
+                     [                    C       -h F    ]
+                     [ -P21 E0            E1 - P22 E0     ]
+                     [                    e               ]
+
+With the columns a and the rows e the trivial multiplier is left out: the matrix is singular where an eigenvalue of P is a
+multiplier of the Poincare map. Without them it is singular where one is a multiplier of the cycle. (A phase condition under an
+integral would not do in place of e: with u' of constant length, (t - 1/2) u' would satisfy it and all equations for P = -1.)
+
+All of these matrices have C in common. With n rows H more, on the states at both ends, it is regular whatever P is, and is
+factored once by condensation: A = [C; H]^-1. With a column b and a row c that may border each copy, v = A [r; 0] + K [y; a; g],
+where r is the right side of C and y = H v. The columns of K solve C v = 0, C v = h F and C v = -b_C. The conditions remain,
+
+                     [ E1 K - P E0 K + b_E ]
+                     [ e K           + b_e ]  [y; a; g] = their right side - the same rows of A [r; 0]
+                     [ c_v K         + c_a ]
+
+with b_E, b_e and c_a in the columns of g, g and a: a dense matrix of n + 2 rows for each copy. The transposed matrix has the
+same parts.
+
+The characteristic matrices of cycles, and of cycles of maps, and their forms (`contin.events.normal_forms`).
 
 Time is measured in periods, s = t / T, so that the field is G = T F; J, B and C are its derivatives of first, second and third
-order along the cycle. L(mu) v = v' - J v, with v(1) = mu v(0) (`contin.cycles.round`; with a symmetry of order n, over one n-th
+order along the cycle. L(mu) v = v' - J v, with v(1) = mu v(0) (with a symmetry of order n, over one n-th
 of the period, with S v(0) for v(0)). Near a bifurcation time goes on by ds/dt = (1 - stretch) / T, but evenly with a forcing.
 The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the discrete
 equations, so that the coefficients converge with the cycle.
@@ -19,18 +51,195 @@ the first point.
 from __future__ import annotations
 
 import functools
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 
 from contin.arrays import Array, Numbers
-from contin.core.multilinear import of_complex
+from contin.core.differences import of_complex
 from contin.cycles.equations import PeriodicEquations
 from contin.cycles.map_equations import MapEquations
-from contin.cycles.round import Round, Solver
+from contin.draws import generator
 from contin.events.normal_forms import DenseForm, Direction, Form
 from contin.linalg.border import Borders
-from contin.problems.own_names import PERIOD
+from contin.problems.statement import PERIOD
+
+
+class Collocated:
+    """The collocation equations C of a cycle with the rows H: solves with the matrix [C; H].
+
+    Attributes
+    ----------
+    free : ndarray, shape (n, states)
+        Solutions of C v = 0: the first has H v = (1, 0, ...).
+    inside : int
+        Number of rows of C.
+    """
+
+    def __init__(self, system: PeriodicEquations, x: Array) -> None:
+        n = system.states_count
+        # In general position to the states at both ends that the equations admit: with ten seeds, a normal form at 16 states
+        # changes by 1e-13 of its value.
+        rows = np.linalg.qr(generator("round").standard_normal((2 * n, n)))[0].T
+        self._factors = system.with_conditions(x, rows)
+        self.inside = system.state_size - n
+        right = np.zeros((n, system.state_size))
+        right[:, self.inside :] = np.eye(n)
+        self.free: Array = self._factors.solve(right)
+
+    def solve(self, values: Array) -> Array:
+        """Return the v (m, states) with C v = values (m, inside) and H v = 0."""
+        right = np.zeros((len(values), self.inside + len(self.free)), dtype=values.dtype)
+        right[:, : self.inside] = values
+        return _by_parts(self._factors.solve, right)
+
+    def solve_transposed(self, values: Array) -> Array:
+        """Return the w (m, inside) with C^T w = values (m, states), for values that are normal to the solutions of C v = 0."""
+        return _by_parts(self._factors.solve_transposed, values)[:, : self.inside]
+
+
+def _by_parts(solve: Callable[[Array], Array], values: Array) -> Array:
+    """Return the solutions of real equations with right-hand sides that may be complex."""
+    if np.isrealobj(values):
+        return solve(values)
+    real, imaginary = solve(np.stack([values.real, values.imag]))
+    return real + 1j * imaginary
+
+
+class Solver:
+    """Solves with the matrix of a round, bordered or not, and with its transpose; solutions are NaN where it is singular.
+
+    Unknowns are [v_1, a_1, v_2, a_2, ... | g_1, g_2, ...]; equations are [those of each copy | the rows c of each copy].
+
+    Parameters
+    ----------
+    around : Round
+    coupling : ndarray, shape (copies, copies)
+        P.
+    border : pair of ndarray, shape (size,), optional
+        b and c of each copy.
+    """
+
+    def __init__(self, around: Round, coupling: Array, border: tuple[Array, Array] | None = None) -> None:
+        self._round, self._collocated, self._coupling = around, around.collocated, coupling
+        self._row = None if border is None else border[1][: around.states]
+        inside, copies, n = self._collocated.inside, len(coupling), around.n
+        columns = [self._collocated.free, *([around.free_by_period] if around.phased else [])]
+        if border is not None:
+            columns.append(-self._collocated.solve(border[0][None, :inside]))
+        self._basis = np.concatenate(columns)  # K, its columns as rows
+        every, traces = np.eye(copies), self._traces(self._basis)
+        matrix = self._conditions(every[:, None, :, None] * traces[:, None]).transpose(2, 3, 0, 1).copy()
+        if border is not None:
+            for copy in range(copies):
+                matrix[copy, : around.size - inside, copy, -1] += border[0][inside:]
+                matrix[copy, -1, copy, n : n + around.phased] += border[1][around.states :]
+        self._matrix = matrix.reshape(copies * matrix.shape[1], -1)
+
+    def _traces(self, v: Array) -> Array:
+        """Return what the conditions need of v (..., states): [v(0), v(1), c.v]."""
+        n = self._round.n
+        products = [] if self._row is None else [(v @ self._row)[..., None]]
+        return np.concatenate([v[..., :n], v[..., -n:], *products], axis=-1)
+
+    def _conditions(self, traces: Array) -> Array:
+        """Return the left sides of the conditions of each copy, of traces (..., copies, :): at the ends, of e, of c."""
+        n, around = self._round.n, self._round
+        first, last = traces[..., :n], traces[..., n : 2 * n]
+        values = [last - self._coupling @ (first @ around.system.turn.T)]
+        if around.phased:
+            values.append((first @ around.direction)[..., None])
+        return np.concatenate([*values, traces[..., 2 * n :]], axis=-1)
+
+    def solve(self, b: Array) -> Array:
+        """Return the x with A x = b, or for rows of b the rows x."""
+        if b.ndim == 2:
+            return np.array([self.solve(row) for row in b])
+        copies, size, inside, n = len(self._coupling), self._round.size, self._collocated.inside, self._round.n
+        own, borders = b[: copies * size].reshape(copies, size), b[copies * size :].reshape(copies, -1)
+        v = self._collocated.solve(own[:, :inside])
+        y = self._solved(self._matrix, np.hstack([own[:, inside:], borders]) - self._conditions(self._traces(v)))
+        v = v + y @ self._basis
+        return np.append(np.hstack([v, y[:, n : n + self._round.phased]]), y[:, n + self._round.phased :])
+
+    def solve_transposed(self, c: Array) -> Array:
+        """Return the y with A^T y = c, likewise."""
+        if c.ndim == 2:
+            return np.array([self.solve_transposed(row) for row in c])
+        copies, around, n = len(self._coupling), self._round, self._round.n
+        own, borders = c[: copies * around.size].reshape(copies, around.size), c[copies * around.size :].reshape(copies, -1)
+        v, of_period = own[:, : around.states], own[:, around.states :]
+        y = self._solved(self._matrix.T, np.hstack([np.zeros((copies, n)), of_period, borders]) + v @ self._basis.T)
+        rest = v.astype(y.dtype)
+        rest[:, -n:] -= y[:, :n]
+        rest[:, :n] += self._coupling.T @ y[:, :n] @ around.system.turn
+        if around.phased:
+            rest[:, :n] -= y[:, n, None] * around.direction
+        if self._row is not None:
+            rest = rest - y[:, -1:] * self._row
+        w = self._collocated.solve_transposed(rest)
+        ends = n + around.phased
+        return np.append(np.hstack([w, y[:, :ends]]), y[:, ends:])
+
+    def _solved(self, matrix: Array, right: Array) -> Array:
+        """Return the solution of the dense equations, shape (copies, :)."""
+        try:
+            found: Any = np.linalg.solve(matrix, right.ravel()).reshape(right.shape)
+        except np.linalg.LinAlgError:
+            return np.full(right.shape, np.nan)
+        return cast(Array, found)
+
+
+class Round:
+    """The linearization of a cycle x over one round.
+
+    Parameters
+    ----------
+    system : PeriodicEquations
+    x : ndarray, shape (size,)
+    phased : bool
+        With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of autonomous
+        systems only.
+
+    Attributes
+    ----------
+    size : int
+        Number of equations, and of unknowns, of one copy.
+    """
+
+    states: int
+    n: int
+    size: int
+    collocated: Collocated
+
+    def __init__(self, system: PeriodicEquations, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
+        self.system, self.phased, self._x = system, phased, x
+        self.states, self.n = system.state_size, system.states_count
+        self.size = self.states + phased
+        #: The factored collocation equations.
+        self.collocated = collocated or Collocated(system, x)
+
+    def with_period(self) -> Round:
+        """Return the same with a change of the period and the condition at t = 0."""
+        return Round(self.system, self._x, True, self.collocated)
+
+    @functools.cached_property
+    def direction(self) -> Array:
+        """The row e, by the states at t = 0."""
+        system: Any = self.system
+        return system.start_direction
+
+    @functools.cached_property
+    def free_by_period(self) -> Array:
+        """The v with C v = h F and H v = 0, shape (1, states)."""
+        by_period = self.system.parameter_columns(self._x, (PERIOD,))[: self.collocated.inside]
+        return -self.collocated.solve(by_period.T)
+
+    def solver(self, coupling: complex | Numbers, border: tuple[Array, Array] | None = None) -> Solver:
+        """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""
+        return Solver(self, np.atleast_2d(coupling), border)
+
 
 #: Largest number of unknown states of a map: with twice as many, dense factors take eight times as long, a minute.
 MOST = 2000

@@ -1,4 +1,4 @@
-"""Periodic orbits as the user states them: a vector field, autonomous or with a forcing of known period."""
+"""Cycles and maps: what users state, and symmetries."""
 
 from __future__ import annotations
 
@@ -10,22 +10,121 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array, Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
-from contin.collocation.degree import CYCLE_DEGREE
-from contin.core.scales import Scales
-from contin.cycles.symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
-from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
+from contin.collocation.mesh import CYCLE_DEGREE
+from contin.core.system import Scales
+from contin.cycles.branches import CycleCollocation, ForcedCollocation, MapSystem, PeriodicCollocation
+from contin.draws import PLACES, generator
 from contin.equilibria.statement import AlgebraicProblem, ReducedProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, named_values
-from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
-from contin.problems.mass import Mass
-from contin.problems.own_names import PERIOD, ROUNDS
-from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
+from contin.levels import LOCATED
+from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, whole_rounds, winding_names
+from contin.problems.rewriting import Mass, check_field, found_elsewhere, of_parameters, returning, scaled
+from contin.problems.statement import PERIOD, ROUNDS, check_statement
+
+#: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
+_MOST = 60
+
+
+def symmetry_matrix(symmetry: object, count: int) -> Array:
+    """Return the matrix of a symmetry that is given as a matrix or as its diagonal.
+
+    Raises
+    ------
+    ProblemError
+        It is neither, the identity, or of no order up to 60.
+    """
+    try:
+        given = np.array(symmetry, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        given = np.empty(0)
+    if given.shape not in ((count,), (count, count)) or not np.isfinite(given).all():
+        raise ProblemError(f"symmetry: {checks.shown(symmetry)} must be {count} signs, or a matrix of {count} rows and columns")
+    matrix = np.diag(given) if given.ndim == 1 else given
+    if order_of(matrix) == 1:
+        raise ProblemError("symmetry: the identity is none; leave it out")
+    return matrix
+
+
+def order_of(matrix: Array) -> int:
+    """Return the smallest n with S^n = 1.
+
+    Raises
+    ------
+    ProblemError
+        There is none up to 60.
+    """
+    one, power = np.eye(len(matrix)), matrix
+    for order in range(1, _MOST + 1):
+        if np.abs(power - one).max(initial=0.0) <= LOCATED:
+            return order
+        power = power @ matrix
+    raise ProblemError(f"symmetry: no power of the matrix up to {_MOST} is the identity")
+
+
+def check_equivariance(field: Function, matrix: Array, names: Sequence[str], parameters: Mapping[str, float]) -> None:
+    """Check F(S u) = S F(u) at some places, with the default parameters; where the field has no value nothing is checked.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if order_of(matrix) == 1:
+        return
+    of_state, of_parameters = named_values(tuple(names)), named_values(tuple(parameters))
+    p = of_parameters(**parameters)
+    for u in generator("symmetry").uniform(-1, 1, (PLACES, len(names))):
+        try:
+            first, turned = (np.array(field(of_state(*map(float, v)), p), dtype=float) for v in (u, matrix @ u))
+        except (ArithmeticError, ValueError):
+            continue  # a root or logarithm of a negative number
+        gap = np.abs(turned - matrix @ first)
+        if np.any(gap > LOCATED * (1 + np.abs(first).max())):
+            raise ProblemError(
+                f"symmetry: the field does not have it; the rate of {names[int(gap.argmax())]} at S u differs by "
+                f"{gap.max():.3g} from that of S F(u) for u = {', '.join(f'{value:.3g}' for value in u)}"
+            )
+
+
+def check_lattice(matrix: Array, names: Sequence[str], angles: Mapping[str, float]) -> None:
+    """Check that S changes states by whole rounds of angles where an angle goes round once.
+
+    Raises
+    ------
+    ProblemError
+    """
+    periods = np.array([angles.get(name, 0.0) for name in names])
+    for name, period in angles.items():
+        moved = period * matrix[:, names.index(name)]
+        if np.any(np.abs(moved - whole_rounds(moved, periods)) > LOCATED):
+            raise ProblemError(f"symmetry: where {name} goes round once, S u must change by whole rounds of angles")
+
+
+def image(matrix: Sequence[Sequence[float]], u: Sequence[Any]) -> list[Any]:
+    """Return the product of a matrix, as a list of rows, and a vector; zeros and ones are not multiplied."""
+    return [_product(row, u) for row in matrix]
+
+
+def _product(row: Sequence[float], u: Sequence[Any]) -> Any:
+    terms = [value if factor == 1 else factor * value for factor, value in zip(row, u) if factor]
+    return sum(terms[1:], terms[0])
+
+
+def averaged(function: Function, matrix: Array, names: Sequence[str], order: int) -> Function:
+    """Return the mean of a functional over u, S u, ..., S^(n-1) u, as a function of (t, u, p)."""
+    state = named_values(tuple(names))
+    powers = [np.linalg.matrix_power(matrix, k).tolist() for k in range(order)]
+
+    def mean(t: Any, u: Any, p: Any) -> Any:
+        values = [function(state(*image(power, u)), p) for power in powers]
+        return sum(values[1:], values[0]) / order
+
+    return mean
+
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
@@ -457,3 +556,84 @@ def _of_forcing(function: Function, period: Function) -> Function:
         return function(p.rounds * period(p) * t, u, p)
 
     return mean
+
+
+class MapProblem(AlgebraicProblem):
+    """Fixed points u = f(u, p) of a map, and its cycles: fixed points of f applied ``rounds`` times.
+
+    ``rounds`` is a parameter of every map by itself, a whole number that cannot be free. A guess is one point of the cycle, or
+    all of them one after the other; columns are those of the first. Multipliers are the eigenvalues of the derivative over all
+    rounds: special points are folds (LP), branch points (BP), period doublings (PD) and torus bifurcations (TR).
+
+    Angles may gain whole rounds along a cycle: ``winding_x``, a parameter by itself, is the number of those of the angle x. It
+    is read off the guess, unless it is given; over ``rounds`` it is the rotation number.
+
+    Parameters
+    ----------
+    map : callable
+        ``f(u, p)`` returns the next states.
+    states : sequence of str, or int
+    parameters : mapping of str to float
+        Names and default values.
+    functionals : mapping of str to callable, optional
+        ``g(u, p)``: columns of every point.
+    angles : sequence of str, or mapping of str to float, optional
+        States that are the same after a period, which is 2 pi or, in a mapping, any other: where one of them goes round once,
+        the next states change by whole rounds of angles.
+
+    Raises
+    ------
+    ProblemError
+        A name, or a map with another number of values than states.
+
+    Examples
+    --------
+    The logistic map doubles its period at r = 3:
+
+    >>> import contin
+    >>> logistic = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0})
+    >>> branch = contin.trace(contin.solve(logistic, [0.5]), free=["r"], limits={"r": (2, 4)})
+    >>> print([(point.label, round(point["r"], 10)) for point in branch.labelled("PD")])
+    [('PD', 3.0)]
+
+    The circle map, locked to half a round an iteration:
+
+    >>> import math
+    >>> def circle(u, p):
+    ...     return (u.x + p.w - p.k / (2 * math.pi) * math.sin(2 * math.pi * u.x),)
+    >>> locked = contin.solve(MapProblem(circle, ["x"], {"w": 0.5, "k": 0.9}, angles={"x": 1}), [0.3], {"rounds": 2})
+    >>> print(locked["winding_x"], round(locked["x"], 10))
+    1.0 0.3156183315
+    """
+
+    def __init__(
+        self, map: Function, states: Sequence[str] | int, parameters: Mapping[str, float],
+        functionals: Mapping[str, Function] | None = None, angles: Angles = (),
+    ) -> None:  # fmt: skip
+        names = check_statement(states, parameters, {})
+        own = {ROUNDS: 1.0, **dict.fromkeys(winding_names(angle_periods(angles, names)), 0.0)}
+        for name in own:
+            if name in parameters:
+                raise ProblemError(f"parameters: {name} is a parameter of every map by itself")
+        parameters = {**parameters, **own}
+        super().__init__(map, states, parameters, {} if functionals is None else functionals, dynamics=False, angles=angles)
+        if self.equation_size != len(self.state_names):
+            raise ProblemError(f"map returns {self.equation_size} values for the {len(names)} states {', '.join(names)}")
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> MapSystem:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes; there is no mesh."""
+        return MapSystem(self, free, parameters, scales)
+
+    def _check_angles(self) -> None:
+        if self.angles and self.equation_size == len(self.state_names):
+            check_periodic("map", self.batch("map"), self.angles, self.parameters, lifts=True)
+
+    def _signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        return {"map": self._signature.arguments, "functionals": self._signature.arguments}
+
+    def _compiled(self, name: str) -> Batch:
+        return super()._compiled("residual" if name == "map" else name)

@@ -30,10 +30,10 @@ from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.linalg.factors import Factors
-from contin.linalg.replaced import ReplacedRows
+from contin.linalg.blocks import Factors
+from contin.linalg.border import ReplacedRows
+from contin.problems.rewriting import found_elsewhere
 from contin.problems.statement import Statement, multipliers_of, phases_of
-from contin.problems.vector_field import found_elsewhere
 
 #: A curve of cycles ends where they are smaller than this part of a power of two above its largest reference, which does not
 #: change with its steps; parameters differ from those of the equilibrium by the square of the size. With 1e-3 of the largest

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.draws import ASIDE, PLACES, generator
 from contin.equilibria.equations import AlgebraicEquations
 from contin.levels import APART, CERTAIN, LOCATED
-from contin.linalg.dense import DenseFactors
-from contin.shown import COLUMNS
+from contin.linalg.matrices import DenseFactors
+from contin.text import COLUMNS
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000

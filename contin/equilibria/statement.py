@@ -10,12 +10,12 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array, Function, Places
 from contin.collocation.mesh import MOST_INTERVALS
-from contin.core.scales import Scales
+from contin.core.system import Scales
+from contin.equilibria.branches import Algebraic
 from contin.equilibria.dependence import conservation_laws, written
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch
@@ -23,10 +23,8 @@ from contin.functions.recording import result_count
 from contin.functions.signature import Arguments, Signature, argument_count, named_values
 from contin.levels import LOCATED
 from contin.problems.angles import angle_periods, check_periodic
-from contin.problems.mass import Mass
-from contin.problems.own_names import unused
-from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
-from contin.problems.vector_field import combined, returning
+from contin.problems.rewriting import Mass, combined, returning
+from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement, unused
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -21,9 +21,9 @@ from contin.events.branch_point import locate_branch_point
 from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
 from contin.events.multiple_point import MultiplePoint, locate_multiple_point
 from contin.levels import APART
-from contin.linalg.factors import Factors
+from contin.linalg.blocks import Factors
+from contin.linalg.border import smallest_directions
 from contin.linalg.orientation import canonical_basis
-from contin.linalg.singular import smallest_directions
 
 #: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
 #: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.

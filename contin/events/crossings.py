@@ -23,12 +23,11 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
+from contin.linalg.blocks import Factors
+from contin.linalg.border import ReplacedRows, fill_products, orthonormalize, random_rows
 from contin.linalg.condensation import Factorization
-from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.ends import compared, is_near_one
-from contin.linalg.factors import Factors
-from contin.linalg.replaced import ReplacedRows
-from contin.linalg.singular import fill_products, orthonormalize, random_rows
+from contin.linalg.matrices import DenseFactors, eigenvalues
 
 #: Size of the largest matrix of which all eigenvalues are computed at once (some 5 ms). The iteration takes a tenth of that;
 #: it went wrong where eigenvectors were nearly parallel (inverses of size 1e6): with 24, one of 60 random problems lost 7

@@ -21,9 +21,8 @@ from contin.core.labels import Label
 from contin.core.small import SMALL
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
-from contin.events.arc import Arc, Place, SpecialPoint
+from contin.events.arc import Arc, Place, SpecialPoint, find_zero
 from contin.events.normal_forms import pair
-from contin.events.root import find_zero
 from contin.events.spectra import find_moves, moves_of
 from contin.levels import BESIDE, DOUBLED
 

@@ -1,7 +1,22 @@
-"""Inspection of a step: does it stay on its branch, and which special points does it pass?
+"""What lies inside a step: the test functions that are asked, the points found, and steps that jump to another branch.
+
+The quantity that vanishes on a trivial branch (``settings.trivial``): its round-off, and what its values at two points say.
+
+A branch ends on the trivial one where the quantity crosses zero with a slope: at both ends of the step it is well above its
+round-off, and its signs differ. Where it falls from well above its round-off to next to nothing Newton's method has left for
+the trivial branch: the step is refused. Where it is round-off at the beginning already (it can decay along a branch that runs
+on, beside a homoclinic orbit), its sign says nothing.
+
+Inspection of a step: does it stay on its branch, and which special points does it pass?
 
 In order: the end on the trivial branch, or a branch point, or several; zeros of the test functions, looked for between the
 folds; the folds; the end of a closed branch. What was located is sorted by its distance along the step.
+
+The watch list of a run: what both ends of a step say of special points inside it, and of whether it stays on its branch.
+
+It is made when a run begins. Each entry compares numbers of both ends, and asks for a closer look at the step
+(`contin.events.inspection`) where something may happen in between. A step for which no entry asks is plain: nothing else is
+computed of it.
 """
 
 from __future__ import annotations
@@ -10,25 +25,56 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.labels import SINGULAR, Label
+from contin.core.newton import Newton
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
-from contin.core.state import Reason, Stop
-from contin.core.trial import Event, Linearization, Trial
+from contin.core.step import Reason, Stop
+from contin.core.trial import Event, Linearization, Trial, same_sign, sign_changed
 from contin.events.arc import Arc, Place, SpecialPoint, stop_of
 from contin.events.branch_points import BranchPointSearch
-from contin.events.folds import FoldSearch
+from contin.events.dips import separated
+from contin.events.folds import FoldSearch, may_turn
 from contin.events.labelled import finding_of
-from contin.events.trivial import crossed, round_off
-from contin.events.zeros import separated
 from contin.functions.kernel_parts import helper
-from contin.levels import APART, BESIDE, CORRECTED, DEPENDENT, DOUBLED, ROUGH
+from contin.levels import APART, BESIDE, CERTAIN, CORRECTED, DEPENDENT, DOUBLED, ROUGH, ROUND_OFF
+
+#: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or
+#: a decay is fast: all are then taken in shorter steps. At 10 a decay beside a homoclinic orbit would be cut into many steps,
+#: at 1e6 a jump from a branch of small amplitude would pass.
+_CLEAR = 1e3
+
+
+def round_off(trial: Trial, name: str, newton: Newton) -> float:
+    """Return about how large the quantity can be by errors of the corrector alone."""
+    relative = CERTAIN * max(newton.tolerance, trial.newton_error, ROUND_OFF)
+    system = trial.system
+    if name in system.free:
+        at = system.parameter_index(name)
+        return float(relative * (1 + abs(trial.x[at])) * system.free_scales[at - system.state_size])
+    signs = np.where(np.arange(system.size) % 2, 1.0, -1.0)  # of the errors: not all alike, which a difference would hide
+    moved = Trial.without_tangent(system, trial.x + relative * signs * (1 + np.abs(trial.x)))
+    return abs(moved[name] - trial[name])
+
+
+def jumped(before: Trial, trial: Trial, name: str, newton: Newton) -> bool:
+    """Return whether the quantity, well above its round-off at one end of a step, is next to nothing at the other."""
+    value, after = abs(before[name]), abs(trial[name])
+    return after * _CLEAR < value and value > _CLEAR * round_off(trial, name, newton)
+
+
+def crossed(before: Trial, trial: Trial, name: str, newton: Newton) -> bool:
+    """Return whether the quantity changes its sign from one end of a step to the other, well above its round-off at both."""
+    if not sign_changed(before[name], trial[name]):
+        return False
+    return min(abs(before[name]), abs(trial[name])) > round_off(trial, name, newton)
+
 
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
@@ -418,3 +464,95 @@ def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
     group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
     place = {id(point): number for point, number in zip(order, group)}
     return sorted(points, key=lambda point: (place[id(point)], point.test is not None and point.test.label != Label.FOLD))
+
+
+#: Returns whether a step wants a closer look.
+Entry = Callable[[Inspection], bool]
+
+
+def watch_list(
+    system: Discretization,
+    settings: Settings,
+    tests: Sequence[Event],
+    fold: Event | None,
+    index: Event | None,
+) -> list[Entry]:
+    """Return the entries of a run; each returns whether it asks for a closer look at a step.
+
+    Parameters
+    ----------
+    system : Discretization
+        Of the first point; others of the run have the same free parameters.
+    settings : Settings
+    tests : sequence of Event
+    fold, index : Event, optional
+        The rate of the primary parameter, and the index of a variational problem.
+    """
+    held = [test for test in tests if test.holds_one_of(system.free)]
+    entries: list[Entry] = [_determinant(settings.branch_points), Inspection.may_close]
+    entries += [_value(system.free.index(test.column), test) for test in held]
+    entries += [_sign(test) for test in tests if test not in held]
+    if fold is not None:
+        entries.append(lambda inspection: may_turn(inspection.arc, fold))
+    if settings.trivial is not None:
+        entries.append(_trivial(settings.trivial))
+    if index is not None:
+        entries.append(_changed(index))
+    if system.size_of_solutions is not None:
+        entries.append(_sign(system.size_of_solutions))
+    return entries
+
+
+def _determinant(counts: bool) -> Entry:
+    """That of the determinant's sign and, where branch points are looked for, of singular values that come near zero."""
+
+    def asks(inspection: Inspection) -> bool:
+        before, trial = inspection.arc.before, inspection.arc.trial
+        return not same_sign(before.sign, trial.sign) or (counts and inspection.branch_points.count != (0, True))
+
+    return asks
+
+
+def _value(place: int, test: Event) -> Entry:
+    """That of a value of a free parameter, the one at this place."""
+    value = test.value
+    assert value is not None
+
+    def asks(inspection: Inspection) -> bool:
+        before, trial = inspection.arc.before, inspection.arc.trial
+        system = trial.system
+        at, size = system.state_size + place, system.free_scales[place]
+        first, last = before.x[at] * size - value, trial.x[at] * size - value
+        same = first < 0 > last or first > 0 < last
+        return not same or (test.limit and trial.value(test) >= 0)
+
+    return asks
+
+
+def _sign(test: Event) -> Entry:
+    """That of a test function: what it says of a step itself or, where it has nothing to say, the signs at both ends."""
+
+    def asks(inspection: Inspection) -> bool:
+        arc = inspection.arc
+        if test.asks is not None:
+            return test.asks(arc)
+        if test.search is not None or test.looks:
+            return True
+        return arc.passes(test)
+
+    return asks
+
+
+def _trivial(name: str) -> Entry:
+    def asks(inspection: Inspection) -> bool:
+        arc = inspection.arc
+        return crossed(arc.before, arc.trial, name, arc.newton)
+
+    return asks
+
+
+def _changed(index: Event) -> Entry:
+    def asks(inspection: Inspection) -> bool:
+        return abs(inspection.arc.before.value(index) - inspection.arc.trial.value(index)) > 0
+
+    return asks

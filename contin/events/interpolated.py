@@ -19,16 +19,14 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from contin.arrays import Array
-from contin.collocation.basis import interpolation
+from contin.collocation.mesh import interpolation
 from contin.core.newton import Newton, rounded_off
 from contin.core.protocol import Carrier, Discretization, inner
-from contin.core.state import Reason, State, Stop, standing_at
-from contin.core.step import located
+from contin.core.step import Reason, State, Stop, located, standing_at
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
-from contin.events.arc import Arc, SpecialPoint
+from contin.events.arc import Arc, SpecialPoint, find_zero
 from contin.events.labelled import Finding
-from contin.events.root import find_zero
 from contin.levels import BESIDE, ROUGH
 
 #: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate: that of the coefficients of a

@@ -1,6 +1,6 @@
 """Multiple points: where F_x loses rank by d > 1 at once, located, with the tangents of all branches that meet there.
 
-With d columns Psi and 1 + d rows Phi the matrix M of `contin.events.bordered` is regular there, too. It defines the
+With d columns Psi and 1 + d rows Phi the matrix M of `contin.events.branch_point` is regular there, too. It defines the
 manifold F(x) + Psi beta = 0 over the coordinates s = Phi.(x - x0): beta(s), of d components, with derivatives G from M. At the
 point beta and G vanish (d + d (1 + d) equations for 1 + d unknowns: Gauss-Newton, which converges where a symmetry makes them
 agree). Branches are the zeros of beta. With v_i the derivatives of x, those of second and third order follow from
@@ -27,9 +27,8 @@ from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
 from contin.levels import APART, CORRECTED, DEPENDENT, DOUBLED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH, ROUND_OFF, TINY
-from contin.linalg.border import orthonormal
+from contin.linalg.border import orthonormal, smallest_directions
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
-from contin.linalg.singular import smallest_directions
 
 #: Directions from which zeros on a sphere are sought: each of the at most 3^d lines is found many times.
 _DIRECTIONS = 300

@@ -1,4 +1,6 @@
-"""Normal forms of equilibria, of cycles and of cycles of maps (Kuznetsov, Elements of Applied Bifurcation Theory).
+"""Normal forms of folds, Hopf points and others, with the errors of their coefficients.
+
+Normal forms of equilibria, of cycles and of cycles of maps (Kuznetsov, Elements of Applied Bifurcation Theory).
 
 Perturbations that are multiplied by exp(rate t), or in a round by mu = exp(rate), are the null vectors of a characteristic
 matrix L(rate). With the forms B and C, the derivatives of second and third order, a coordinate xi of the centre manifold obeys
@@ -21,21 +23,95 @@ vanishes at a cusp.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array, Indices, Numbers
-from contin.core.multilinear import of_complex
+from contin.core.differences import of_complex
 from contin.core.system import System
 from contin.events.arc import SpecialPoint
-from contin.events.coefficient import Coefficient
+from contin.levels import APART, CERTAIN, LOCATED, ROUGH, ROUND_OFF
 from contin.linalg.border import Bordered, Borders, Solves, null_vectors
-from contin.linalg.dense import DenseFactors
+from contin.linalg.matrices import DenseFactors
 from contin.linalg.orientation import oriented
+
+#: A value that is not small beside its terms is no error, with terms below this size: that is not estimated. Near where it is
+#: infinite the terms are large: 2e7 at the doubling of Hénon's map with a Jacobian of -1 + 1e-7.
+_MODERATE = 1e6
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms.
+
+    The bifurcation is supercritical where ``side * value`` is negative. ``estimate`` returns the error, when that is asked for.
+    """
+
+    value: float
+    size: float
+    estimate: Callable[[], float]
+    side: int = 1
+
+    @functools.cached_property
+    def error(self) -> float:
+        """The estimated error."""
+        return self.estimate()
+
+    @classmethod
+    def of(cls, terms: Callable[[Array], Numbers], x: Array, system: Any) -> Coefficient:
+        """Return the coefficient at a point x from its terms there: the real part of their sum.
+
+        The relative error of the derivatives of ``system`` is part of the error, and so is what an error of x
+        changes. At centres of conservative systems the coefficient is zero, and not larger than its error.
+        """
+        best, of_derivatives = system.with_derivative_error(lambda: terms(x))
+        value, size = float(best.sum().real), float(np.abs(best).sum())
+
+        def estimate() -> float:
+            random, changes = draws.generator("coefficient"), []
+            for _ in range(draws.DRAWS):
+                moved = x + ROUND_OFF * (1 + np.abs(x)) * draws.signs(random, x)
+                changes.append(abs(value - float(terms(moved).sum().real)))
+            return float(CERTAIN * max(changes) + of_derivatives * size)
+
+        return cls(value, size, estimate)
+
+    def is_meaningless(self, error: float) -> bool:
+        """Return whether an error is as large as the terms, and not just round-off of terms that are zero."""
+        return not (error < self.size or error < LOCATED)
+
+    def signed(self, known: float) -> float:
+        """Return the value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations.
+
+        ``known`` is the error of the point, relative to 1 + |x|: what Newton's method left may be more than at located ones.
+        """
+        error = self.error * max(1.0, CERTAIN * known / ROUND_OFF) if not self.is_certain else 0.0
+        return self.value if not abs(self.value) <= error else 0.0
+
+    @property
+    def is_certain(self) -> bool:
+        """Its terms do not cancel, and are neither so large nor so small that it can be an error."""
+        return abs(self.value) > ROUGH * self.size and LOCATED < self.size < _MODERATE
+
+    @property
+    def vanishes(self) -> bool:
+        """The terms cancel, or are round-off of derivatives of order one, or no larger than their error: it is 1e18 at 1e-9.
+
+        Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
+        """
+        small = abs(self.value) < APART * self.size + LOCATED
+        return small or (self.size < _MODERATE and abs(self.value) <= self.error)
+
+
+#: Where nothing is known: at the ends of curves, and where it is infinite.
+UNKNOWN = Coefficient(math.nan, math.nan, lambda: math.nan)
 
 
 class Direction(NamedTuple):

@@ -13,16 +13,14 @@ from contin.core.labels import Label
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.settings import Settings
-from contin.core.settling import ROUNDS
-from contin.core.state import standing_at
-from contin.core.step import located
+from contin.core.step import ROUNDS, located, standing_at
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, Finding, finding_of
 from contin.levels import CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
-from contin.linalg.factors import Factors
+from contin.linalg.blocks import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05

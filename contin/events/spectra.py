@@ -14,11 +14,11 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.small import Equations, evaluate_slopes
-from contin.events.nearness import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
+from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import APART, LOCATED
-from contin.linalg.spectrum import fill_eigenvalues
+from contin.linalg.small import fill_eigenvalues
 
 #: Parts of a step at which multipliers are known: both ends, and `LOOKS` between them.
 _PLACES = np.array([0.0, *LOOKS, 1.0])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 
-from contin import checks
+from contin import errors as checks
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.recorded_arrays import NUMPY
-from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import recorded_paths
+from contin.functions.stand_ins import RecordedFunction
 from contin.functions.tape import Tape, Unrecordable
 
 

@@ -39,7 +39,7 @@ from contin.functions.kernel_parts import (
     llvm,
     variable,
     whole,
-)
+)  # fmt: skip
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, TIME, Inputs, Program, program
 from contin.functions.tape import Tape

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.errors import ProblemError
 from contin.functions import derivatives

@@ -31,8 +31,8 @@ import numpy as np
 from contin import threads
 from contin.errors import ContinError
 from contin.functions import machine_code
-from contin.functions.cache import cache_directory
 from contin.functions.kernel_parts import KERNELS, length, parts
+from contin.functions.machine_code import cache_directory
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

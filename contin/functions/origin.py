@@ -15,7 +15,7 @@ from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recording import record
 from contin.functions.tape import Number, Operation, Tape, Unrecordable
-from contin.shown import COLUMNS
+from contin.text import COLUMNS
 
 #: Folders of code that is not the user's.
 _LIBRARIES = tuple(str(Path(file).parent) for file in (np.__file__, __file__))

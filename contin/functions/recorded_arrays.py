@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex, is_complex, part
-from contin.functions.tables import Table
-from contin.functions.tape import Number, Tape, Unrecordable, power
+from contin.functions.tape import Number, Table, Tape, Unrecordable, power
 
 #: Largest matrix of recorded numbers that is inverted: masses of two or three bodies. Cofactors of four rows are 40 terms.
 _LARGEST_INVERSE = 3

@@ -20,15 +20,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin import checks, draws
+from contin import draws
+from contin import errors as checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, numbers
 from contin.functions.recorded_complex import ComplexNumber
-from contin.functions.recorded_function import RecordedFunction
 from contin.functions.signature import ABSENT, PROBES, Arguments, Signature, UserFunction, component_count, flat, returned
-from contin.functions.stand_ins import prepared
+from contin.functions.stand_ins import RecordedFunction, prepared
 from contin.functions.tape import Tape, Unrecordable
 from contin.levels import LOCATED
 

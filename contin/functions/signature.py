@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 

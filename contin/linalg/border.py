@@ -1,4 +1,6 @@
-"""Null vectors of a nearly singular matrix A, from columns b and rows c that make it regular (Griewank & Reddien 1984):
+"""Null vectors of nearly singular matrices, from bordered ones, and factors of a matrix with other last rows.
+
+Null vectors of a nearly singular matrix A, from columns b and rows c that make it regular (Griewank & Reddien 1984):
 
                             x      beta
                          [  A      b  ]  [ v_i ]   [ 0   ]
@@ -8,6 +10,19 @@ The numbers g vanish where A v = 0; dg_i = -w.dA v_i. Borders of the null vector
 ones come first, then those that their solutions make, which is inverse iteration. Where they follow null vectors that turn,
 the determinant of the bordered matrix keeps its sign, and so do v, w and g. Rows about a whole space are renewed at accepted
 points of a run only: made at an iterate of Newton's method that is far away they may point the other way.
+
+Factors of a matrix from those of another one, which has other last rows, and further columns beside:
+
+                    [ A    B ]                      [ A ]
+                M = [        ],          wanted:    [   ]         M^-1 [ 0; I ] = [ D; E ],
+                    [ R    0 ]                      [ T ]
+
+The solutions of A x = a, T x = t are x = x_0 + D y, with M [x_0; s_0] = [a; 0], and the small system
+
+                [ T D ]       [ t - T x_0 ]
+                [  E  ] y  =  [   - s_0   ]          whose determinant times that of M is the one that is wanted.
+
+Where M is regular everywhere, it is the small matrix that becomes singular.
 """
 
 from __future__ import annotations
@@ -20,6 +35,10 @@ import numpy as np
 
 from contin.arrays import Array, Numbers
 from contin.draws import generator
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, helper
+from contin.linalg.blocks import Factors
+from contin.linalg.matrices import DenseFactors
 
 #: Rounds of inverse iteration from random borders; each divides the error by the ratio of the smallest singular values. With
 #: ten, the curves of the tests are the same.
@@ -56,7 +75,7 @@ class Bordered:
 
     Examples
     --------
-    >>> from contin.linalg.dense import DenseFactors
+    >>> from contin.linalg.matrices import DenseFactors
     >>> found = Bordered(DenseFactors(np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]])), (2, 2))
     >>> found.right.tolist(), found.g.tolist(), found.left.tolist()
     ([[0.0, 1.0]], [[0.0]], [[1.0, 0.0]])
@@ -165,3 +184,137 @@ def _largest_part(vector: Numbers) -> Array:
     if np.iscomplexobj(vector):
         vector = (vector * np.exp(-0.5j * np.angle(vector @ vector))).real
     return vector / np.linalg.norm(vector)
+
+
+@functools.lru_cache(maxsize=8)
+def random_rows(count: int, size: int) -> Array:
+    """Return rows to start an iteration from, shape (count, size), always the same: not to be written to."""
+    block = generator("singular").standard_normal((count, size))
+    block.flags.writeable = False
+    return block
+
+
+@helper
+def orthonormalize_row(rows, i):
+    """Make a row orthonormal to those before, which are orthonormal: Gram-Schmidt, twice where little of the row is left."""
+    size = rows.shape[1]
+    largest, square = 0.0, 0.0
+    for k in range(size):
+        largest = max(largest, abs(rows[i, k]))
+    for k in range(size):  # near a bifurcation solutions are huge
+        rows[i, k] /= largest
+        square += rows[i, k] * rows[i, k]
+    for _ in range(2):
+        before, square = square, 0.0
+        for j in range(i):
+            product = 0.0
+            for k in range(size):
+                product += rows[j, k] * rows[i, k]
+            for k in range(size):
+                rows[i, k] -= product * rows[j, k]
+        for k in range(size):
+            square += rows[i, k] * rows[i, k]
+        if square >= 0.5 * before:  # otherwise what is left is partly round-off
+            break
+    for k in range(size):
+        rows[i, k] /= np.sqrt(square)
+
+
+@kernel
+def orthonormalize(rows: Matrix, first: int) -> None:
+    """Make the rows from ``first`` on orthonormal, and orthogonal to those before, which are: in place."""
+    for i in range(first, rows.shape[0]):
+        orthonormalize_row(rows, i)
+
+
+@kernel
+def fill_products(one: Matrix, other: Matrix, known: int, count: int, products: Matrix) -> None:
+    """Fill one[i].other[j] for i, j < ``count``, in place, where not both are less than ``known``; both are multiples of four.
+
+    BLAS gives products of this size to several threads: on a busy machine they wait for each other, a thousand times as long as
+    the products take.
+    """
+    size = one.shape[1]
+    for i in range(count):
+        row = one[i]
+        for j in range(known if i < known else 0, count, 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for k in range(size):
+                a += row[k] * other[j, k]
+                b += row[k] * other[j + 1, k]
+                c += row[k] * other[j + 2, k]
+                d += row[k] * other[j + 3, k]
+            products[i, j], products[i, j + 1], products[i, j + 2], products[i, j + 3] = a, b, c, d
+
+
+def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2) -> tuple[Array, Array, Array]:
+    """Return right and left singular vectors of the ``count`` smallest singular values, as rows, by block inverse iteration.
+
+    It starts from random vectors, not from those of the point before: a resumed run must decide as one that was never
+    interrupted.
+
+    Returns
+    -------
+    right, left : ndarray, shape (count, size)
+    response : ndarray, shape (count, count)
+        right J^-1 left^T: about the reciprocals of the singular values.
+    """
+    right = random_rows(min(count, size), size)
+    for _ in range(rounds):
+        left = factors.solve_transposed(right)
+        orthonormalize(left, 0)
+        solved = factors.solve(left)
+        right = solved.copy()
+        orthonormalize(right, 0)
+    return right, left, right @ solved.T
+
+
+class ReplacedRows:
+    """Solves with the wanted matrix, and with its transpose.
+
+    Parameters
+    ----------
+    factors : Factors
+        Of M.
+    solutions : ndarray, shape (m, size + columns)
+        Those for the last m unit vectors: D and E, as rows.
+    rows : ndarray, shape (m - columns, size)
+        T.
+
+    Examples
+    --------
+    >>> other = DenseFactors(np.array([[1.0, 2.0], [0.0, 1.0]]))
+    >>> found = ReplacedRows(other, other.solve(np.array([[0.0, 1.0]])), np.array([[3.0, 4.0]]))
+    >>> found.solve(np.array([5.0, 11.0])).round(12).tolist(), found.sign
+    ([1.0, 2.0], -1.0)
+    """
+
+    def __init__(self, factors: Factors, solutions: Array, rows: Array) -> None:
+        self.size, self.others = rows.shape[1], solutions.shape[1] - len(solutions)
+        self.factors, self.rows, self._added = factors, rows, solutions[:, : self.size]
+        self.small = np.vstack([rows @ self._added.T, solutions[:, self.size :].T])
+
+    @functools.cached_property
+    def _small(self) -> DenseFactors:
+        return DenseFactors(self.small)
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant."""
+        return self.factors.sign * self._small.sign
+
+    def solve(self, b: Array) -> Array:
+        """Return the x with J x = b, or for rows of b the rows x."""
+        right = np.concatenate([b[..., self.others :], np.zeros((*b.shape[:-1], len(self.small) - len(self.rows)))], axis=-1)
+        if not b[..., : self.others].any():
+            return np.asarray(self._small.solve(right) @ self._added)
+        first = self.factors.solve(np.concatenate([b[..., : self.others], np.zeros_like(right)], axis=-1))
+        right -= np.concatenate([first[..., : self.size] @ self.rows.T, first[..., self.size :]], axis=-1)
+        return np.asarray(first[..., : self.size] + self._small.solve(right) @ self._added)
+
+    def solve_transposed(self, c: Array) -> Array:
+        """Return the y with J^T y = c, likewise."""
+        last = self._small.solve_transposed(c @ self._added.T)
+        own, beside = last[..., : len(self.rows)], last[..., len(self.rows) :]
+        y = self.factors.solve_transposed(np.concatenate([c - own @ self.rows, -beside], axis=-1))
+        return np.concatenate([y[..., : self.others], own], axis=-1)

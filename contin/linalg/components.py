@@ -23,11 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices, Pattern
+from contin.linalg.blocks import Blocks, Layout, layout, share
 from contin.linalg.condensation import Factorization
-from contin.linalg.dense import DenseFactors
 from contin.linalg.elimination import factorize
-from contin.linalg.layout import Blocks, Layout, layout
-from contin.linalg.segments import share
+from contin.linalg.matrices import DenseFactors
 
 
 class Component(NamedTuple):
@@ -80,7 +79,7 @@ class Around(NamedTuple):
 
 
 class ComponentFactors:
-    """A factored bordered matrix of components: `contin.linalg.factors.Factors`.
+    """A factored bordered matrix of components: `contin.linalg.blocks.Factors`.
 
     Vectors of unknowns are [states at all nodes | parameters], vectors of equations [collocation | rows around it].
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
-from contin.linalg.layout import Layout
-from contin.linalg.segments import Share
+from contin.linalg.blocks import Layout, Share
 from contin.linalg.vector import (
     PANEL,
     Rows,
@@ -25,7 +24,7 @@ from contin.linalg.vector import (
     reduce_column,
     solve_triangle,
     subtract_products,
-)
+)  # fmt: skip
 
 
 class Eliminated(NamedTuple):

@@ -26,8 +26,8 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.linalg.border import orthonormalize_row
 from contin.linalg.elimination import Eliminated
-from contin.linalg.singular import orthonormalize_row
 
 
 class Relations(NamedTuple):
@@ -261,7 +261,7 @@ def relations_of(
     Parameters
     ----------
     offsets : ndarray of int
-        Where the groups of states begin, as in `contin.linalg.layout.Layout`.
+        Where the groups of states begin, as in `contin.linalg.blocks.Layout`.
     factors : Eliminated
     carried : ndarray, shape (S, n + r, 2 n + k)
         The rows that relate both ends of each segment, and their share of the border.

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.draws import PLACES, generator
 from contin.errors import ProblemError

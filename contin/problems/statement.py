@@ -1,4 +1,4 @@
-"""The statement of a problem: the protocol that every kind of problem follows, and checks of names and values."""
+"""The statement of a problem: what every kind of problem has, and checks of names and values."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import inspect
 import keyword
 import math
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import function_of
 from contin.functions.signature import Arguments
+from contin.functions.stand_ins import RecordedFunction
 from contin.functions.tape import Unrecordable
 
 #: Bounds on numbers that a user gives, so that a slip of the keyboard is a sentence and not a full memory.
@@ -294,3 +294,35 @@ def _usable(kind: str, names: Sequence[str]) -> tuple[str, ...]:
         if names.count(name) > 1:
             raise ProblemError(f"{kind}: the name {name!r} stands twice")
     return names
+
+
+#: The period of a cycle: of an autonomous field a parameter, of a forced one a column.
+PERIOD = "period"
+#: Of a forced field, the parameter that says after how many periods of the forcing the cycle closes; of a map, after how many
+#: rounds.
+ROUNDS = "rounds"
+#: The time that the computed part of a connecting orbit takes.
+TIME = "time"
+
+
+def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
+    """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
+
+    Raises
+    ------
+    ProblemError
+        It is no whole number, or free.
+    """
+    rounds = parameters[ROUNDS]
+    if ROUNDS in free:
+        raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
+    if not (rounds >= 1 and rounds == int(rounds)):
+        raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
+    return int(rounds)
+
+
+def unused(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken."""
+    while name in taken:
+        name += "_"
+    return name

@@ -8,15 +8,15 @@ from typing import Any, overload
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.core.labels import Label
-from contin.core.state import Stop
+from contin.core.step import Stop
 from contin.results import curve as curves
 from contin.results import plot, table
-from contin.results.axes import Axes
+from contin.results.marks import Axes
 from contin.results.point import Point
-from contin.shown import ROWS
+from contin.text import ROWS
 
 
 @dataclass

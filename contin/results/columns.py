@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
-from contin.collocation.basis import basis
+from contin.collocation.mesh import basis
 from contin.results.storage import contents
 
 

@@ -1,9 +1,60 @@
-"""Labels in pictures and tables: their marks and their words."""
+"""Axes, colours and marks of pictures, and the words for labels."""
 
 from __future__ import annotations
 
-from contin.results.colours import Colour
+import enum
+from typing import TYPE_CHECKING, Any
+
 from contin.results.record import Record
+
+if TYPE_CHECKING:  # matplotlib is imported where it draws only
+    from matplotlib.axes import Axes as Axes
+else:
+    Axes = object
+
+
+def new_axes(count: int = 1) -> Any:
+    """Return the axes of a new figure: one, or an array of some, side by side.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is not installed.
+    """
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plot needs matplotlib, which is not installed: pip install matplotlib") from error
+    if count == 1:
+        return pyplot.subplots(layout="constrained")[1]
+    return pyplot.subplots(1, count, layout="constrained", figsize=(4.2 * count, 3.8))[1]
+
+
+class Colour(enum.StrEnum):
+    """A colour of a picture; each is a string that matplotlib takes. Grey is for what is beside the point.
+
+    Examples
+    --------
+    >>> str(Colour.BLUE)
+    '#0072B2'
+    """
+
+    BLUE = "#0072B2"
+    VERMILION = "#D55E00"
+    GREEN = "#009E73"
+    PURPLE = "#CC79A7"
+    ORANGE = "#E69F00"
+    SKY = "#56B4E9"
+    YELLOW = "#F0E442"
+    BLACK = "#000000"
+    GREY = "#767676"
+
+
+#: Colours of lines, in the order in which pictures take them. A line of yellow is hard to see on white paper.
+PALETTE = (
+    Colour.BLUE, Colour.VERMILION, Colour.GREEN, Colour.PURPLE, Colour.ORANGE, Colour.SKY, Colour.BLACK,
+)  # fmt: skip
+
 
 #: Labelled points: matplotlib's symbol, colour, and the words of the legend.
 _MARKS = {

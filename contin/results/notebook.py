@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from contin.results.marks import heading
 from contin.results.record import Record
-from contin.shown import ROWS
+from contin.text import ROWS
 
 
 def point_to_html(point: Record) -> str:

@@ -9,16 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.core.labels import Label
 from contin.errors import ProblemError
-from contin.results.axes import Axes, new_axes
-from contin.results.colours import Colour
-from contin.results.cubic import PARTS
-from contin.results.curve import column, curve
-from contin.results.marks import heading, mark_of
+from contin.results.curve import PARTS, column, curve
+from contin.results.marks import Axes, Colour, heading, mark_of, new_axes
 from contin.results.point import Point
-from contin.shown import COLUMNS
+from contin.text import COLUMNS
 
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
 _CRITICAL = (Label.FOLD, Label.BRANCH_POINT, Label.PERIOD_DOUBLING, Label.TORUS, Label.HOPF)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.second_variation import SecondVariation, second_variation
 from contin.core.labels import Label
@@ -18,13 +18,12 @@ from contin.core.trial import Trial
 from contin.errors import ProblemError
 from contin.events.error import error
 from contin.events.phase_loads import phase_loads
-from contin.problems.own_names import PERIOD
+from contin.problems.statement import PERIOD
 from contin.results import notebook
-from contin.results.axes import Axes
-from contin.results.profile import Profile
-from contin.results.record import Record
+from contin.results.marks import Axes
+from contin.results.record import Profile, Record
 from contin.results.sensitivity import sensitivities
-from contin.shown import COLUMNS
+from contin.text import COLUMNS
 
 if TYPE_CHECKING:
     from contin.cycles.floquet import Floquet

@@ -7,17 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.system import Collocation
 from contin.cycles.floquet import floquet
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
 from contin.problems.statement import declared
-from contin.results.axes import Axes, new_axes
-from contin.results.colours import PALETTE
-from contin.results.profile import Profile
-from contin.results.record import Record, over_t
+from contin.results.marks import PALETTE, Axes, new_axes
+from contin.results.record import Profile, Record, over_t
 
 #: Places at which a solution is drawn, for each interval of its mesh: a polynomial of degree 8 looks smooth.
 _PER_INTERVAL = 8

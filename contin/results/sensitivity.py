@@ -6,19 +6,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.core.differences import derivative
 from contin.core.labels import Label
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
 from contin.errors import ProblemError
-from contin.events.bordered import BorderedMatrix
+from contin.events.branch_point import BorderedMatrix
 from contin.events.hopf import critical_real_part
 from contin.events.labelled import frequency_of
 from contin.problems.angles import winding_names
-from contin.problems.own_names import ROUNDS
-from contin.problems.statement import declared
+from contin.problems.statement import ROUNDS, declared
 from contin.results.record import Record, system_of
 
 

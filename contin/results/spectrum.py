@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.core.rounding import changes
-from contin.core.spectral import Spectral
+from contin.core.spectral import Spectral, changes
 from contin.core.trial import Trial
 from contin.errors import ProblemError
 from contin.events.error import error
-from contin.linalg.dense import eigenvalues
+from contin.linalg.matrices import eigenvalues
 
 
 class Spectrum:

@@ -11,15 +11,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.core.protocol import Discretization
-from contin.core.scales import Scales
-from contin.core.state import Stop
-from contin.core.system import System
-from contin.defining.branch_point_curve import BranchPointCurve
-from contin.defining.fold_curve import FoldCurve
+from contin.core.step import Stop
+from contin.core.system import Scales, System
+from contin.defining.special_points import BranchPointCurve, FoldCurve
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
 from contin.functions.signature import named_values
 from contin.levels import LOCATED, ROUGH
 from contin.problems.angles import periods_of, whole_rounds, winding_names
-from contin.problems.own_names import PERIOD, ROUNDS
+from contin.problems.statement import PERIOD, ROUNDS
 from contin.results.point import Point
 from contin.search.guess import restated
 from contin.search.solving import solve

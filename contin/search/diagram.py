@@ -10,29 +10,27 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.continuation.progress import Progress
 from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Options, Settings, settings_with
-from contin.core.state import Reason, Stop
+from contin.core.step import Reason, Stop
 from contin.cycles.statement import CycleProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.labelled import finding_of
 from contin.problems.angles import whole_rounds, winding_names
-from contin.problems.own_names import PERIOD, ROUNDS
-from contin.problems.statement import declared
+from contin.problems.statement import PERIOD, ROUNDS, declared
 from contin.results import plot, table
-from contin.results.axes import Axes
 from contin.results.branch import Branch
+from contin.results.marks import Axes
 from contin.results.point import Point
 from contin.results.record import system_of
-from contin.search.cycle_starts import switched, switches
-from contin.search.further import Search, Searched, Site
-from contin.search.images import Symmetry, are_one, check_maps, image, seen
-from contin.shown import ROWS, shown
+from contin.search.further import Search, Searched, Site, Symmetry, are_one, check_maps, image, seen
+from contin.search.trace import switched, switches
+from contin.text import ROWS, shown
 
 
 @dataclass

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contin import checks, draws
+from contin import draws
+from contin import errors as checks
 from contin.arrays import Array, Indices
 from contin.boundary.statement import BoundaryValueProblem
 from contin.core.labels import Label
@@ -28,8 +29,7 @@ from contin.equilibria.dependence import reduced
 from contin.errors import ConvergenceError
 from contin.functions.origin import Place, jump, not_finite
 from contin.levels import APART, CERTAIN, CORRECTED, DEPENDENT, LAST_PLACES, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
-from contin.linalg.border import Bordered, cosine
-from contin.linalg.singular import random_rows
+from contin.linalg.border import Bordered, cosine, random_rows
 
 #: Null vectors are looked for among so many, at most: a free beam in space has six.
 _MOST = 8

@@ -1,28 +1,268 @@
-"""A point of contin from a solution of AUTO-07p."""
+"""AUTO-07p's files: branches and labelled solutions (``b.NAME``, ``s.NAME``), and a point of contin from a solution."""
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
-from contin.collocation.basis import basis, interpolation
+from contin.collocation.mesh import basis, interpolation
 from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.cycles.statement import CycleProblem
+from contin.equilibria.branches import Algebraic
 from contin.equilibria.statement import AlgebraicProblem
-from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.angles import windings
-from contin.problems.own_names import PERIOD, ROUNDS
-from contin.problems.statement import with_multipliers
-from contin.results.auto_07p import AutoSolution
+from contin.problems.statement import PERIOD, ROUNDS, with_multipliers
 from contin.results.point import Point
+
+#: AUTO's codes of labelled points. Of more than one digit they hold the kind of curve before the last digit.
+_LABELS = {
+    1: "BP", 2: "LP", 3: "HB", 4: "RG", 5: "LP", 6: "BP", 7: "PD", 8: "TR", 9: "EP", -1: "BT", -2: "CP", -3: "ZH", -4: "UZ",
+    -5: "R1", -6: "R2", -7: "R3", -8: "R4", -9: "MX",
+}  # fmt: skip
+#: Generalized Hopf points, whose code is none of those above.
+_GENERALIZED_HOPF = -32
+#: Characters of a row before its values: branch, point, type and label.
+_HEAD = 19
+#: A number of Fortran: an exponent of three digits may have no letter.
+_NUMBER = re.compile(r"([-+]?\d*\.\d+)(?:[EeDd]?([-+]\d+))?")
+
+
+@dataclass(frozen=True, eq=False)
+class AutoSolution:
+    """A labelled solution of AUTO-07p.
+
+    Attributes
+    ----------
+    label, number : str, int
+        AUTO's two letters (RG for every NPR-th point), and its number, by which AUTO restarts.
+    parameters : mapping of str to float
+        By name, ``"PAR(1)"`` where AUTO and `read_auto` were given none. PAR(11) is the period of a cycle.
+    t, states : ndarray, shapes (K,) and (K, n)
+        The solution on 0 <= t <= 1; of an equilibrium K = 1. The pair is a guess for `contin.solve`.
+    intervals, degree : int
+        AUTO's mesh: NTST and NCOL; degree 0 of an equilibrium.
+
+    Examples
+    --------
+    >>> rest = AutoSolution("EP", 1, {"PAR(1)": 0.5}, np.zeros(1), np.array([[0.0, 2.0]]), 1, 0)
+    >>> rest
+    AutoSolution(EP 1: PAR(1)=0.5)
+    """
+
+    label: str
+    number: int
+    parameters: Mapping[str, float]
+    t: Array
+    states: Array
+    intervals: int
+    degree: int
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items() if value)
+        return f"AutoSolution({self.label} {self.number}: {values})"
+
+
+@dataclass(frozen=True, eq=False)
+class AutoBranch:
+    """A branch of AUTO-07p: the columns of all its points, and the solutions at labels.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray
+        By AUTO's heading: the free parameters, ``"L2-NORM"``, maxima or values of the states.
+    labels : list of str
+        Of all points in order; "" for those without.
+    solutions : list of AutoSolution
+
+    Examples
+    --------
+    >>> branch = AutoBranch({"PAR(1)": np.array([0.0, 1.0])}, ["EP", "EP"])
+    >>> branch
+    AutoBranch(2 points: EP, EP; PAR(1))
+    """
+
+    columns: dict[str, Array]
+    labels: list[str]
+    solutions: list[AutoSolution] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        labels = checks.listed(filter(None, self.labels))
+        return f"AutoBranch({len(self.labels)} points: {labels}; {checks.listed(self.columns)})"
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def labelled(self, label: str) -> list[AutoSolution]:
+        """Return the solutions that carry a label, in order.
+
+        Examples
+        --------
+        >>> AutoBranch({}, []).labelled("HB")
+        []
+        """
+        return [solution for solution in self.solutions if solution.label == label]
+
+
+@dataclass
+class _Block:
+    """Rows of the file of branches that belong to one branch, and the headings above them."""
+
+    headings: str
+    names: dict[int, str]
+    rows: list[str] = field(default_factory=list)
+
+    @property
+    def heads(self) -> list[tuple[int, int, int, int]]:
+        """Branch, point, type and label of all rows."""
+        return [tuple(map(int, row.split()[:4])) for row in self.rows]  # type: ignore[misc]
+
+    def branch(self) -> AutoBranch:
+        """Return the branch without its solutions."""
+        values = np.array([_numbers(row[_HEAD:]) for row in self.rows])
+        width = (len(self.rows[0].rstrip("\n")) - _HEAD) // values.shape[1]
+        names = [self.headings[_HEAD + k * width : _HEAD + (k + 1) * width].strip() for k in range(values.shape[1])]
+        names = [_renamed(name, self.names) for name in names]
+        return AutoBranch(dict(zip(names, values.T)), [_label(head[2]) if head[3] else "" for head in self.heads])
+
+
+@checks.arguments
+def read_auto(folder: str | Path, name: str | None = None, *, parameters: Mapping[int, str] | None = None) -> list[AutoBranch]:
+    """Read the branches that AUTO-07p wrote: ``b.NAME`` and ``s.NAME``, or fort.7 and fort.8.
+
+    `from_auto` makes a point of a solution, from which `trace` goes on.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str, optional
+        The name under which AUTO saved the run; fort.7 and fort.8 without.
+    parameters : mapping of int to str, optional
+        Names by AUTO's number: ``{1: "mu"}`` for PAR(1). Names that AUTO was given (``parnames``) are known.
+
+    Returns
+    -------
+    list of AutoBranch
+        In the order of the file.
+
+    Raises
+    ------
+    OSError
+        A file cannot be read.
+    ProblemError
+        A file is none of AUTO-07p.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = (pathlib.Path(folder) / "fort.7").write_text(
+    ...         "   0    PT  TY  LAB      PAR(1)            L2-NORM      \\n"
+    ...         "   1     1   9    1  0.0000000000E+00   2.0000000000E+00\\n"
+    ...     )
+    ...     _ = (pathlib.Path(folder) / "fort.8").write_text("")
+    ...     read_auto(folder, parameters={1: "mu"})
+    [AutoBranch(1 points: EP; mu, L2-NORM)]
+    """
+    given = {} if parameters is None else parameters
+    files = [Path(folder) / (f"fort.{unit}" if name is None else f"{letter}.{name}") for letter, unit in (("b", 7), ("s", 8))]
+    texts = [file.read_text(encoding="utf-8", errors="replace") for file in files]
+    try:
+        blocks = list(_blocks(texts[0], given))
+        branches = [block.branch() for block in blocks]
+    except (ValueError, IndexError) as error:
+        raise ProblemError(f"{str(files[0])!r} is no file of branches of AUTO-07p") from error
+    try:
+        _add_solutions(branches, blocks, texts[1])
+    except (ValueError, IndexError) as error:
+        raise ProblemError(f"{str(files[1])!r} is no file of solutions of AUTO-07p, or not that of the branches") from error
+    return branches
+
+
+def _label(code: int) -> str:
+    """Return AUTO's two letters."""
+    if code == _GENERALIZED_HOPF:
+        return "GH"
+    last = abs(code) % 10
+    return _LABELS.get(last if code > 0 else -last, "")
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(f"{digits}e{exponent or 0}") for digits, exponent in _NUMBER.findall(text)]
+
+
+def _renamed(heading: str, names: Mapping[int, str]) -> str:
+    """Return the name of a parameter for AUTO's heading ``PAR(1)``, others as they are; the period is PAR(11)."""
+    number = 11 if heading == "PERIOD" else int(found[1]) if (found := re.fullmatch(r"PAR\((\d+)\)", heading)) else 0
+    return names.get(number, heading)
+
+
+def _blocks(text: str, given: Mapping[int, str]) -> Iterator[_Block]:
+    """Yield the branches of a file: each begins with lines of branch 0, the last of which holds the headings.
+
+    Raises
+    ------
+    ValueError
+        There are none.
+    """
+    block: _Block | None = None
+    names: dict[int, str] = {}
+    for line in text.splitlines():
+        number = int(line.split(maxsplit=1)[0])
+        if number == 0:
+            if block is not None and block.rows:
+                yield block
+                names = {}
+            if found := re.match(r"\s*0\s+parnames\s*=\s*(\{.*\})", line):
+                names = ast.literal_eval(found[1])
+            block = _Block(line, {**names, **given})
+            continue
+        if block is None:
+            raise ValueError("rows without headings")
+        block.rows.append(line)
+    if block is None or not block.rows:
+        raise ValueError("no branch")
+    yield block
+
+
+def _add_solutions(branches: list[AutoBranch], blocks: list[_Block], text: str) -> None:
+    """Read all solutions, and add each to the branch that lists it.
+
+    A solution begins with a line of at least twelve whole numbers: branch, point, type, label, number of free parameters, ISW,
+    number of places, numbers at a place (t and the states), number of lines that follow, NTST, NCOL, number of parameters.
+    """
+    lines = text.splitlines()
+    at, first = 0, 0
+    while at < len(lines):
+        head = [int(word) for word in lines[at].split()]
+        count, width, following = head[6:9]
+        values = _numbers(" ".join(lines[at + 1 : at + 1 + following]))
+        places = np.array(values[: count * width]).reshape(count, width)
+        wanted = (abs(head[0]), abs(head[1]), head[3])
+        first = next(i for i in [*range(first, len(blocks)), *range(first)] if wanted in _known(blocks[i]))
+        names = blocks[first].names
+        parameters = {names.get(i + 1, f"PAR({i + 1})"): value for i, value in enumerate(values[len(values) - head[11] :])}
+        branches[first].solutions.append(
+            AutoSolution(_label(head[2]), head[3], parameters, places[:, 0], places[:, 1:], head[9], head[10])
+        )
+        at += 1 + following
+
+
+def _known(block: _Block) -> set[tuple[int, int, int]]:
+    """Return branch, point and label of all rows with a label."""
+    return {(abs(branch), abs(point), label) for branch, point, _, label in block.heads if label}
+
 
 #: Labels of points that contin locates, too.
 _LOCATED = (Label.BRANCH_POINT, Label.FOLD, Label.HOPF, Label.PERIOD_DOUBLING, Label.TORUS)

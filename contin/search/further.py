@@ -1,9 +1,11 @@
-"""Disconnected solutions: deflated iterations at chosen values of a parameter, and the account of what was tried.
+"""Disconnected solutions: deflated iterations at chosen values of a parameter, and images under symmetries.
+
+Disconnected solutions: deflated iterations at chosen values of a parameter, and the account of what was tried.
 
 At each value:
 
 1. Collect the solutions that are known there, of all branches followed so far; those under symmetries count as known.
-2. Start the deflated iteration (`contin.search.deflation`) from one guess after the other, from each until it finds nothing:
+2. Start the deflated iteration (`contin.search.solving`) from one guess after the other, from each until it finds nothing:
    guesses that are given, states of branches at other values, known states with the sign reversed, their images under given
    maps, and with random perturbations. Where it does not converge, take damped Newton steps from the guess itself.
 3. Correct what it finds, adapt the mesh, and compare it with all that is known. The caller follows each new one both ways; its
@@ -21,22 +23,77 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
 from contin.core.newton import correct
+from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
+from contin.functions.signature import argument_count
 from contin.levels import APART, LOCATED
-from contin.names import exact_text
 from contin.problems.statement import MOST_CONDITIONS, declared
 from contin.results.point import Point
 from contin.results.record import system_of
-from contin.search.deflation import deflated
-from contin.search.guess import Guess, Options, first_guess
-from contin.search.images import Symmetry, are_one, check_maps, evenly, image
-from contin.search.lagrange import with_guessed_multipliers
-from contin.search.solving import solved
+from contin.search.guess import Guess, Options, first_guess, with_guessed_multipliers
+from contin.search.solving import deflated, solved
+from contin.text import exact_text
+
+#: Maps times (K,) and states (K, n) of a solution to the states of another one.
+Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
+#: A system, and its unknowns.
+Solution = tuple[Discretization, Array]
+
+
+def check_maps(what: str, maps: Sequence[Symmetry]) -> None:
+    """Require functions of two arguments."""
+    for each in checks.sequence(what, maps, "functions"):
+        if argument_count(checks.function(what, each)) != 2:
+            raise ProblemError(f"{what}: {checks.shown(each)} must take 2 arguments, times (K,) and states (K, n)")
+
+
+def image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
+    """Return the image of unknowns; of a variational problem the states x have one, multipliers stay (see `seen`)."""
+    states = system.states(x).copy()
+    visible = states[:, : declared(system.problem, "dimension")]
+    visible[:] = symmetry(system.nodes, visible.copy())
+    return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
+
+
+def seen(system: Discretization, x: Array) -> Array:
+    """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
+    problem: Any = system.problem
+    if declared(problem, "dimension") == len(problem.states):
+        return x
+    x = x.copy()
+    x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
+    x[[system.parameter_index(name) for name in problem.multipliers]] = 0.0
+    return x
+
+
+def evenly(system: Any) -> Discretization:
+    """Return a system of a problem, on a uniform mesh if it has one: maps that reverse t take nodes to nodes."""
+    if not system.is_function_of_t:
+        return system
+    a, b = system.problem.domain
+    return system.on_mesh(np.linspace(a, b, system.intervals + 1))[0]
+
+
+def are_one(first: Solution, second: Solution, symmetries: Sequence[Symmetry], tolerance: float) -> bool:
+    """Return whether a solution is another one, or its image under one of the symmetries, compared on a uniform mesh.
+
+    Both have the same free parameters.
+    """
+    system = evenly(first[0])
+    there = seen(system, first[0].carrier(system)(first[1]))
+    other = second[0].carrier(system)(second[1])
+    largest = tolerance * (1 + np.sqrt(inner(system, there, there)))
+    for symmetry in symmetries:
+        here, _ = system.in_phase(seen(system, image(system, symmetry, other)), (), there)
+        if np.sqrt(inner(system, here - there, here - there)) <= largest:
+            return True
+    return False
+
 
 #: Longest step of a deflated iteration, relative to 1 + |x|. Of the eight solutions of Carrier's equation at 1/5, steps of .3
 #: to 10 find all, with two seeds; steps of .1 find four with one of them.

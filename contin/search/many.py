@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from contin import checks
+from contin import errors as checks
 from contin.boundary.statement import BoundaryValueProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ContinError, ProblemError
-from contin.shown import shown
+from contin.text import shown
 from contin.threads import MOST
 
 #: Sets of values that a process takes at a time: handing over takes .03 ms a set, .1 ms one at a time. With ten times more,

@@ -1,31 +1,309 @@
-"""A run from a point of a branch."""
+"""A run from a point of a branch, and the first points of branches of cycles, fields in time and connections."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, Unpack
 
 import numpy as np
 
-from contin import checks
+from contin import errors as checks
 from contin.arrays import Array
+from contin.boundary.fields import Fields
+from contin.boundary.oscillating import TIMES, oscillating, turned
+from contin.collocation.mesh import CYCLE_DEGREE, MeshControl
+from contin.connections.branches import ConnectionCollocation, crossing, ending
+from contin.connections.statement import ConnectionProblem
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
+from contin.core.system import usual
+from contin.core.trial import Trial, linearization
+from contin.cycles.branches import CycleCollocation, MapSystem, PeriodicCollocation
+from contin.cycles.floquet import doubles
+from contin.cycles.statement import CycleProblem
+from contin.equilibria.branches import Algebraic, CriticalPair, critical_pair
 from contin.errors import ConvergenceError, ProblemError, warn
-from contin.events.branch_point import locate_branch_point
-from contin.events.labelled import finding_of
-from contin.levels import APART
+from contin.events.branch_point import BranchPoint, locate_branch_point
+from contin.events.labelled import finding_of, frequency_of
+from contin.levels import APART, BESIDE
 from contin.linalg.orientation import oriented_along
-from contin.problems.statement import forget_changed
+from contin.problems.angles import winding_names, windings
+from contin.problems.statement import PERIOD, ROUNDS, TIME, forget_changed
 from contin.results.branch import Branch
-from contin.results.point import Point, underlying
-from contin.search.connection_starts import from_non_central, leaves_saddle_node
-from contin.search.cycle_starts import switched, switches
-from contin.search.field_starts import begins_oscillations, oscillation
+from contin.results.point import Point, point_of, underlying
+
+#: Intervals of the first mesh of a branch from a Hopf point, at least. A run that wants 40 would make its first step on 20 and,
+#: again, on 40: that takes a tenth of a branch of Lorenz's cycles.
+_INTERVALS = 20
+
+
+def switches(point: Point) -> bool:
+    """Return whether a branch of another kind begins at a point."""
+    return point.system.starts_cycles and (point.label == Label.HOPF or doubles(point))
+
+
+def switched(
+    point: Point, fewest: int, free: Sequence[str] | None = None
+) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+    """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
+
+    Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free. The
+    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more.
+
+    Raises
+    ------
+    ProblemError
+        None begin there.
+    ConvergenceError
+        The branch point of doubled orbits is not found.
+    """
+    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point, max(fewest, _INTERVALS))
+    if free is None:
+        return cycles, x, tangent
+    found, x = cycles.with_free(checks.names("free", free), x)
+    along: Any = found.pack(cycles.states(tangent), dict.fromkeys(found.free, 0.0))
+    return found, x, along  # type: ignore[return-value]  # with_free keeps the kind
+
+
+def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Array]:
+    """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
+
+    The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
+
+    Raises
+    ------
+    ProblemError
+        It is no Hopf point of equilibria.
+    """
+    system: Any = point.system
+    if point.label != Label.HOPF or system.is_cycle or not system.starts_cycles:
+        raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
+    pair = critical_pair(system.jacobian(point.x), frequency_of(point))
+    if not pair.is_critical:
+        raise ProblemError("start: the Jacobian of the field has no pair on the imaginary axis there, of which cycles begin")
+    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, intervals)
+    scaled, x = _in_sizes_of_the_equilibrium(cycles, x)
+    if scaled is not cycles:
+        tangent = cycles.carrier(scaled)(tangent)
+    return scaled.with_reference(x + tangent / np.abs(tangent).max()), x, tangent
+
+
+def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[CycleCollocation, Array]:
+    """Return the system of cycles with the sizes of the states and the period of a Hopf point, and x for it.
+
+    Where nothing is far from one it is the same. Sizes that the cycles outgrow are renewed on the way.
+    """
+    states, names = np.abs(cycles.states(x)).max(axis=0), list(cycles.problem.parameters)
+    states = np.where(states > APART * states.max(), states, 0.0)
+    parameters = np.ones(len(names))
+    parameters[[names.index(name) for name in cycles.free]] = np.abs([cycles.parameter(x, name) for name in cycles.free])
+    sizes = usual(np.where(states > APART, states, 0.0)), usual(np.where(parameters > APART, parameters, 0.0))
+    if all(np.all(found == 1) for found in sizes):
+        return cycles, x
+    scaled, x = cycles.with_scales(x, *sizes)
+    return scaled, x
+
+
+def small_cycle(
+    system: Algebraic, x: Array, pair: CriticalPair, size: float, intervals: int = _INTERVALS
+) -> tuple[CycleCollocation, Array, Array]:
+    """Return the system of cycles beside a Hopf point x, the ellipse of this size as one, and the direction in which it grows.
+
+    The free parameters are those of ``system`` and, after the first, the period.
+    """
+    first, *others = system.free
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    parameters[PERIOD] = 2 * math.pi / pair.frequency
+    mesh = np.linspace(0, 1, intervals + 1)
+    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, CYCLE_DEGREE, (first, PERIOD, *others), parameters)
+    wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
+    rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)
+    tangent = cycles.pack((wave * pair.right).real, dict.fromkeys(cycles.free, 0.0))
+    return (cycles.with_reference(rest + size * tangent) if size else cycles), rest + size * tangent, tangent
+
+
+def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+    """Return the system of orbits of twice the period, a period-doubling point as such an orbit, and the tangent there.
+
+    The orbit, traversed twice, is a branch point of that system; the new branch leaves along perturbations that change their
+    sign from one round to the next. With a symmetry S a round is one n-th of the period, the new orbits have the symmetry S^2
+    and, if n is even, about the same period.
+
+    Raises
+    ------
+    ProblemError
+        It is no period-doubling point.
+    ConvergenceError
+        The branch point is not found.
+    """
+    system: Any = point.system
+    if not doubles(point):
+        raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
+    if not system.intervals:
+        return _doubled_map(system, point.x)
+    adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
+    system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
+    mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
+    longer, factor = PERIOD if system.problem.period is None else ROUNDS, 2 if system.order % 2 else 1
+    problem, turn, gained = system.problem, system.problem.symmetry, system.gains[1]
+    further = windings(problem.angles, problem.state_names, gained + turn @ gained)
+    parameters = {**point.parameters, longer: factor * point.parameters[longer], **further}
+    twice: Any = problem.doubled().discretized(system.free, parameters, system.scales, mesh, system.degree)
+    states = system.states(x)
+    x = twice.pack(np.concatenate([states, states[1:] @ turn.T + gained]), parameters)
+    found = locate_branch_point(twice.with_reference(x), x)
+    return twice.with_reference(found.x), found.x, _alternating(twice, found, turn)
+
+
+def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
+    """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
+    twice, x = system.doubled(x)
+    found = locate_branch_point(twice, x)
+
+    def change(tangent: Array) -> float:
+        first, second = np.split(twice.states(tangent), 2)
+        return float(np.abs(second - first).max())
+
+    return twice, found.x, max(found.tangents, key=change)
+
+
+def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
+    """Return the unit tangent that changes most from one round to the next, turned by the symmetry.
+
+    The states of the other one may be round-off, as where the cycles do not depend on the parameter: no share of them tells.
+    """
+    half = twice.nodes.size // 2
+
+    def change(tangent: Array) -> float:
+        states = twice.states(tangent)
+        return float(np.abs(states[: half + 1] @ turn.T - states[half:]).max())
+
+    return max(found.tangents, key=change)
+
+
+def leaves_saddle_node(point: Point) -> bool:
+    """Return whether a point is a non-central homoclinic orbit to a saddle-node, where two curves meet."""
+    return point.label == Label.NON_CENTRAL and not point.system.on_curve
+
+
+def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:
+    """Return the system of the other curve that meets a non-central orbit, the orbit in it, and the tangent there.
+
+    From a curve of orbits to a saddle it is that of central orbits to the saddle-node, and the other way round. The orbit
+    solves the equations of both: its component along the eigenvector is zero at one end. The tangent leads to central orbits,
+    or to those of a saddle.
+
+    Raises
+    ------
+    ProblemError
+        The curve has other than two free parameters.
+    """
+    system: Any = point.system
+    old = system.problem
+    if len(system.free) != old.free_size:
+        raise ProblemError("start: must be a point of a curve of homoclinic orbits in two parameters")
+    to_saddle, side = crossing(point)
+    unstable = old.unstable - side if to_saddle else old.unstable + side
+    values = dict(point.parameters)
+    own = (*old.multipliers, TIME, *winding_names(old.angles))
+    given = {name: value for name, value in values.items() if name not in own}
+    problem = ConnectionProblem(old.field, old.state_names, given, unstable=unstable, angles=old.angles, saddle_node=to_saddle)
+    other = ConnectionCollocation(problem, system.mesh, system.degree, system.free, values, system.scales)
+    other = other.with_reference(point.x)
+    row = np.zeros(other.size)
+    row[other.parameter_index(system.free[0])] = 1.0
+    tangent = linearization(other, point.x, row).tangent
+    inside = ending(other, side).function
+    beside = [inside(Trial.without_tangent(other, point.x + way * BESIDE * tangent)) for way in (1, -1)]
+    return other, point.x, tangent if beside[0] > beside[1] else -tangent
+
+
+#: Degree of the polynomials that stand for the critical vector in the phase condition. They need not be right: any weights do
+#: that move with the oscillation. A spline through the nodes is not smooth, and the mesh was refined to 224 intervals for it.
+_SMOOTH = 12
+#: Most times of one period.
+_MOST = 201
+
+
+def begins_oscillations(point: Point) -> bool:
+    """Return whether time-periodic states of a field begin at a point."""
+    return point.label == Label.HOPF and isinstance(point.system, Fields)
+
+
+def oscillation(point: Point, times: int = TIMES) -> tuple[Point, Array]:
+    """Return the first of the time-periodic states that begin at a Hopf point of a field, of no size, and the tangent there.
+
+    Parameters
+    ----------
+    point : Point
+        A Hopf point of a `BoundaryValueProblem` with ``rates``.
+    times : int
+        Odd number of times of one period at which the states are unknowns, at least 5. `trace` takes 11.
+
+    Raises
+    ------
+    ProblemError
+        It is no such point, or the field has integral conditions.
+
+    Examples
+    --------
+    >>> import contin, math
+    >>> field = contin.BoundaryValueProblem(
+    ...     lambda t, u, p: (u.da, p.w * u.b - u.a * (p.r - u.a**2 - u.b**2), u.db, -p.w * u.a - u.b * (p.r - u.a**2 - u.b**2)),
+    ...     lambda a, b, p: (a.da, b.da, a.db, b.db), ["a", "da", "b", "db"], {"r": -0.1, "w": 2.0},
+    ...     rates={"da": lambda t, u, w, p: w.a, "db": lambda t, u, w, p: w.b})
+    >>> (hopf,) = contin.trace(contin.solve(field, [0.0] * 4), free=["r"], limits={"r": (-0.1, 0.1)}).labelled("HB")
+    >>> first, tangent = oscillation(hopf, 5)
+    >>> waves = contin.trace(first, tangent=tangent, limits={"r": (-1, 1)})
+    >>> print(round(waves[-1]["r"], 9), round(waves[-1]["period"] / math.pi, 9), round(waves[-1]["swing_a"], 9))
+    1.0 1.0 0.5
+    """
+    frequency = frequency_of(point)
+    if not begins_oscillations(point) or frequency is None:
+        raise ProblemError(f"point: one with the label {point.label!r} is no Hopf point of a field")
+    checks.whole("times", times, 5, _MOST)
+    if times % 2 == 0:
+        raise ProblemError(f"times: {times} must be odd")
+    given: Any = point.system
+    system, x = given.without_scales(point.x)
+    count = len(system.problem.states)
+    _, critical = system.form(x).critical(1j * frequency)
+    vector = np.asarray(critical.states)[: system.state_size].reshape(-1, count)
+    phase = {
+        int(k): (_smooth(system.nodes, vector[:, k].real), _smooth(system.nodes, vector[:, k].imag))
+        for k in np.flatnonzero(system.moving_states)
+    }
+    problem = oscillating(system.problem, phase, times)
+    values = {**dict(zip(system.problem.parameters, map(float, system.all_parameters(x)))), PERIOD: 2 * math.pi / frequency}
+    degree = problem.usual_degree(MeshControl().tolerance)  # less than that of the field: there are more states
+    found: Any = problem.discretized([system.free[0], PERIOD], values, None, system.mesh, degree)
+
+    def carried(states: Array) -> Array:
+        return system.evaluate(system.pack(states, dict.fromkeys(system.free, 0.0)), found.nodes)
+
+    first = found.pack(np.tile(carried(system.states(x)), (1, times)), values)
+    wave = carried(vector.real) + 1j * carried(vector.imag)
+    tangent = found.pack(turned(wave, times), dict.fromkeys(found.free, 0.0))
+    return point_of(found, first), tangent / np.abs(tangent).max()
+
+
+def _smooth(nodes: Array, values: Array) -> Callable[[Any], Any]:
+    """Return a polynomial that fits values at the nodes."""
+    fit = np.polynomial.Polynomial.fit(nodes, values, min(_SMOOTH, len(nodes) - 1))
+    (low, high), coefficients = fit.domain.tolist(), fit.coef.tolist()
+
+    def polynomial(t: Any) -> Any:
+        z, found = (2 * t - low - high) / (high - low), 0.0
+        for coefficient in coefficients[::-1]:
+            found = found * z + coefficient
+        return found
+
+    return polynomial
 
 
 @checks.arguments

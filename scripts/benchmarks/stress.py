@@ -90,7 +90,7 @@ def _drift(point) -> float:
 
 def _singular(point) -> float:
     """Return 1 / the smallest singular value of the equations with the arclength condition."""
-    from contin.linalg.singular import smallest_directions
+    from contin.linalg.border import smallest_directions
 
     system = point.system
     factors = system.linearize(point.x, (system.weights * point.tangent,))[1]

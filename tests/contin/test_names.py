@@ -7,7 +7,7 @@ import pytest
 
 from contin import AlgebraicProblem, solve, trace
 from contin.lowlevel import exact_text
-from contin.names import value_names
+from contin.text import value_names
 
 TEXTS = {3.0: "3", -100.0: "-100", 0.3: "0.3", 0.3000001: "0.3000001", 1e6: "1e+06", 1234567.0: "1234567", 1e-300: "1e-300"}
 

@@ -8,7 +8,7 @@ import pytest
 
 import contin
 from contin.functions.batch import Batch
-from contin.linalg.layout import coupled_groups
+from contin.linalg.blocks import coupled_groups
 
 
 def rod(t, u, p):

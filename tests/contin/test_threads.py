@@ -13,7 +13,7 @@ import pytest
 import contin
 from contin import threads
 from contin.functions.batch import Batch
-from contin.linalg import segments
+from contin.linalg import blocks as segments
 
 SOME = [1, 2, 3, 5]
 
@@ -22,8 +22,8 @@ SOME = [1, 2, 3, 5]
 def use(monkeypatch):
     """A function that sets the number of threads; problems of any size use them."""
     monkeypatch.setattr(segments, "_LARGE", 0)
-    monkeypatch.setattr("contin.functions.recorded._MANY", 1)
-    monkeypatch.setattr("contin.functions.recorded._LONG", -1.0)
+    monkeypatch.setattr("contin.functions.batch._MANY", 1)
+    monkeypatch.setattr("contin.functions.batch._LONG", -1.0)
     return lambda count: monkeypatch.setenv("CONTIN_THREADS", str(count))
 
 
@@ -196,7 +196,7 @@ def test_a_forked_process_has_threads_of_its_own(use):
 PROGRAM = """
 import numpy as np, time
 import contin
-from contin.linalg import segments
+from contin.linalg import blocks as segments
 segments._LARGE = 0
 problem = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -p.a * u.u), lambda a, b, p: (a.u, b.u - 1), ["u", "v"], {"a": 1.0})
 system = contin.lowlevel.Collocation(problem, np.linspace(0, 1, 2001), 4, [], {})

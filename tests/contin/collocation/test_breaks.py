@@ -10,9 +10,8 @@ from scipy.optimize import brentq
 
 import contin
 from contin import BoundaryValueProblem, CycleProblem, VariationalProblem
-from contin.collocation.basis import basis
 from contin.collocation.corners import breaks_of
-from contin.collocation.mesh import MeshControl, adapted_mesh, with_breaks
+from contin.collocation.mesh import MeshControl, adapted_mesh, basis, with_breaks
 from contin.errors import InterpretedWarning
 from contin.lowlevel import Batch
 

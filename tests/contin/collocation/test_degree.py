@@ -10,9 +10,8 @@ from bank import spb
 from bank.closed_forms import bratu, bratu_fold
 
 from contin import BoundaryValueProblem, MeshControl, solve, trace
-from contin.collocation import degree
-from contin.collocation.degree import usual_degree
-from contin.collocation.mesh import share
+from contin.collocation import mesh as degree
+from contin.collocation.mesh import share, usual_degree
 from contin.lowlevel import Collocation, basis
 
 PAGE = Path(__file__).parents[3] / "docs" / "collocation.md"

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from contin.collocation.basis import basis
-from contin.collocation.extremes import extremes
+from contin.collocation.mesh import basis
+from contin.collocation.round import extremes
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.013, 0.3, 0.9999])

@@ -7,7 +7,7 @@ import pytest
 
 import contin
 from contin import BoundaryValueProblem, ConnectionProblem, CycleProblem
-from contin.collocation.one_call import CONVERGED, STAGNATES, Control, correct_on_mesh
+from contin.collocation.newton import CONVERGED, STAGNATES, Control, correct_on_mesh
 from contin.core.newton import Newton, correct
 
 

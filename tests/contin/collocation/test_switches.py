@@ -12,11 +12,10 @@ from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import contin
 from contin import BoundaryValueProblem, CycleProblem
-from contin.collocation import switching
-from contin.collocation.basis import basis
+from contin.collocation import corners as switching
 from contin.collocation.corners import selections
 from contin.collocation.defect import split
-from contin.collocation.mesh import MeshControl, moved_to_breaks
+from contin.collocation.mesh import MeshControl, basis, moved_to_breaks
 from contin.errors import InterpretedWarning
 
 

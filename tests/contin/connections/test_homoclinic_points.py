@@ -13,8 +13,8 @@ from cycles.noted import NOTES
 
 import contin
 from contin import AlgebraicProblem, ConnectionProblem, ProblemError
+from contin.connections import branches as homoclinic_points
 from contin.connections import equations as connections
-from contin.connections import events as homoclinic_points
 
 #: Where AUTO-07p locates the flips it does so at the tolerance 1e-7 of the demo; at tighter ones it gives up.
 AUTO = 2e-6

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from contin import AlgebraicProblem, ConvergenceError, Newton
-from contin.core.state import State, standing_at
-from contin.core.step import corrected, judged, located, predict
+from contin.core.step import State, corrected, judged, located, predict, standing_at
 from contin.core.trial import Linearization, Trial
 from contin.lowlevel import Algebraic
 

@@ -7,7 +7,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem
-from contin.cycles.homoclinic import resting_place
+from contin.cycles.ends import resting_place
 
 
 def lorenz(u, p):

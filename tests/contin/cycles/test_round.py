@@ -8,8 +8,8 @@ import pytest
 
 import contin
 from contin import CycleProblem
-from contin.cycles.round import Round
-from contin.linalg.transitions import interval_matrices
+from contin.cycles.normal_forms import Round
+from contin.linalg.periodic import interval_matrices
 
 
 def spread(u, p):
@@ -43,7 +43,7 @@ def cycle_of(name):
 
 
 def whole_matrix(system, x, phased, coupling, b, c):
-    """The matrix that `contin.cycles.round` draws, dense."""
+    """The matrix that `contin.cycles.normal_forms` draws, dense."""
     states, n = system.state_size, system.states_count
     jacobian = system.rates_by_states(x, system.at_gauss_points(x))
     matrices = interval_matrices(system.basis.value, system.basis.slope, np.diff(system.mesh), jacobian)

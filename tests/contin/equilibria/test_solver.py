@@ -9,8 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contin import AlgebraicProblem, ProblemError, solve, trace
-from contin.linalg.dense import DenseFactors
-from contin.linalg.sparse import SparseFactors
+from contin.linalg.matrices import DenseFactors, SparseFactors
 
 #: Unknowns on a line, and on each side of a square: from 200 on the matrix is kept sparse.
 LINE, SIDE = 220, 16

@@ -2,7 +2,7 @@
 
 import pytest
 
-from contin.events.coefficient import Coefficient
+from contin.events.normal_forms import Coefficient
 
 
 @pytest.mark.parametrize("value, size, error, known", [

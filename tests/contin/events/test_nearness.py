@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contin
-from contin.events.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
+from contin.events.dips import CIRCLE, MINUS_ONE, ONE, comes_near
 
 
 def near(first, last, what, map_=0, longer=1.0):

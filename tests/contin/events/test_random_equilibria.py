@@ -11,8 +11,7 @@ import pytest
 import contin
 from contin.events.branch_point import locate_branch_point
 from contin.events.crossings import crossings, quotients
-from contin.linalg.dense import DenseFactors
-from contin.linalg.rightmost import nearest
+from contin.linalg.matrices import DenseFactors, nearest
 
 
 def residual(u, p, out):

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from contin import AlgebraicProblem, ConvergenceError, solve, trace
-from contin.events.root import find_zero
+from contin.events.arc import find_zero
 
 #: Functions with a simple zero between two places. The zeros are exact numbers, but for those of x = cos x (the Dottie number)
 #: and of x e^x = 1 (Lambert's W(1)), which are those of the literature.

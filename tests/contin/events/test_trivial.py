@@ -7,7 +7,7 @@ import pytest
 
 from contin import AlgebraicProblem, Newton, solve, trace
 from contin.core.trial import Trial
-from contin.events.trivial import crossed, jumped, round_off
+from contin.events.inspection import crossed, jumped, round_off
 from contin.lowlevel import Algebraic, locate_branch_point
 
 

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from contin import ContinError
-from contin.functions import cache, machine_code
 from contin.functions import kernel as kernels
+from contin.functions import machine_code
+from contin.functions import machine_code as cache
 from contin.functions.kernel import Kernel
 from contin.functions.kernel_parts import Matrix, Vector, helper
 

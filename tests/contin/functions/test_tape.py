@@ -495,7 +495,7 @@ def test_the_same_bits_alone_in_blocks_and_in_threads(monkeypatch):
     for a, b in ((0, 1), (5, 6), (100, 131), (900, 999)):
         part = batch.jacobian(t[a:b], u[a:b], none, p, columns)
         assert all(np.array_equal(x[a:b], y) for x, y in zip(whole, part))
-    monkeypatch.setattr("contin.functions.recorded._LONG", 0.0)
+    monkeypatch.setattr("contin.functions.batch._LONG", 0.0)
     monkeypatch.setattr("contin.threads.count", lambda: 3)
     again = batch.jacobian(t, u, none, p, columns)
     assert all(np.array_equal(x, y) for x, y in zip(whole, again))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-import contin.boundary.equations
+import contin.boundary.system
 from contin import BoundaryValueProblem
 from contin.boundary.system import Collocation
 
@@ -32,7 +32,7 @@ def system():
 
 
 def _linearized(system, x, monkeypatch, apart):
-    monkeypatch.setattr(contin.boundary.equations, "_APART", 1 if apart else 1000)
+    monkeypatch.setattr(contin.boundary.system, "_APART", 1 if apart else 1000)
     vars(system).pop("_components", None)
     rng = np.random.default_rng(3)
     columns = rng.standard_normal((2, system.equations))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from contin.linalg import segments
+from contin.linalg import blocks as segments
+from contin.linalg.blocks import Blocks, layout
 from contin.linalg.condensation import Factorization
-from contin.linalg.layout import Blocks, layout
 
 
 def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contin.linalg.dense import DenseFactors
+from contin.linalg.matrices import DenseFactors
 
 
 @pytest.mark.parametrize("n", [*range(1, 13), 60])

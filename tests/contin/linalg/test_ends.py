@@ -7,8 +7,8 @@ import pytest
 
 from contin import BoundaryValueProblem
 from contin.boundary.system import Collocation
+from contin.linalg.blocks import share
 from contin.linalg.ends import compared, is_near_one
-from contin.linalg.segments import share
 
 COLUMN = BoundaryValueProblem(lambda t, u, p: (u.v, -p.P * u.u), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 1.0})
 

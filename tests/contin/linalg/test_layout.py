@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contin.linalg.layout import coupled_groups, layout
+from contin.linalg.blocks import coupled_groups, layout
 
 
 def test_groups_come_after_those_that_they_depend_on():

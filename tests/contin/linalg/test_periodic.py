@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from contin.collocation.basis import basis
-from contin.linalg.periodic import log_eigenvalues
-from contin.linalg.transitions import condense, interval_matrices
+from contin.collocation.mesh import basis
+from contin.linalg.periodic import condense, interval_matrices, log_eigenvalues
 
 
 def chain(diagonals, seed=0):

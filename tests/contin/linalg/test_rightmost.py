@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from contin.linalg.rightmost import rightmost
+from contin.linalg.matrices import rightmost
 
 
 def turning(frequency, growth, seed):

@@ -6,8 +6,7 @@ from scipy import sparse
 
 from contin import AlgebraicProblem, solve, trace
 from contin.equilibria import equations as algebraic
-from contin.linalg.dense import DenseFactors
-from contin.linalg.sparse import SparseFactors
+from contin.linalg.matrices import DenseFactors, SparseFactors
 
 RANDOM = np.random.default_rng(4)
 

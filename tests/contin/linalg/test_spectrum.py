@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from contin.linalg.dense import eigenvalues
+from contin.linalg.matrices import eigenvalues
 
 
 def apart(found, known):

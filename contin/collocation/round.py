@@ -1,0 +1,230 @@
+"""What kernels tell of a cycle: its Floquet multipliers, and extreme values of its states."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.collocation.mesh import basis, interpolation
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import IndexVector, Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.levels import APART, LOCATED
+from contin.linalg.periodic import Product, condense, fill_logarithms, product_of
+from contin.linalg.small import fill_eigenvalues
+
+#: What comes of it: multipliers; one of an autonomous system that should be 1 and has drifted; none, which are NaN; none, as
+#: an interval is too long.
+KNOWN, DRIFTED, NOT_FINITE, COARSE = range(4)
+#: Largest size of a rate times the length of an interval. A method of degree d takes (1 + z / 2 + ...) / (1 - z / 2 + ...) for
+#: exp(z), which tends to 1 or -1 on both sides: at 2 and degree 4 the logarithm is off by 2e-5 of it; ten times larger, by more
+#: than it.
+_LONG = 2.0
+#: Intervals are divided where perturbations grow by more than this as a logarithm: beside saddles, where cycles of long periods
+#: have long intervals, growth and decay cancel. Ten times larger, they do not beside a saddle that is near a fold; ten times
+#: smaller, stiff relaxation oscillations take longer, all modes of which decay.
+_GROWS = 0.1
+#: Largest number of parts of an interval: they hold a growth by exp(200).
+_PARTS = 100
+
+
+class Monodromy(NamedTuple):
+    """The room for it.
+
+    ``jacobian`` (N d, n, n) is given; ``order`` (n,) are the states by which its columns stand in a linearized system. An
+    interval may have the ``length``, times the size of a rate. ``matrices`` (N, n, n) are transitions and, where there is a
+    symmetry, its inverse. ``real`` and ``imaginary`` (n,) are the logarithms found.
+    """
+
+    value: Matrix
+    slope: Matrix
+    h: Vector
+    quadrature: Vector
+    order: IndexVector
+    length: float
+    autonomous: int
+    planar: int
+    jacobian: Stack
+    block: Matrix
+    pivots: IndexVector
+    matrices: Stack
+    product: Product
+    real: Vector
+    imaginary: Vector
+
+
+def monodromy_of(system: Any, length: float = _LONG) -> Monodromy:
+    """Return the room of a system of cycles."""
+    n, d, intervals = system.states_count, system.degree, system.intervals
+    symmetric = system.order > 1
+    matrices = np.empty((intervals + symmetric, n, n))
+    if symmetric:
+        matrices[-1] = np.linalg.inv(system.turn)
+    return Monodromy(
+        system.basis.value, system.basis.slope, np.diff(system.mesh), system.gauss_weights, system.order_of_states,
+        length, int(system.autonomous), int(system.autonomous and n == 2 and not symmetric), np.empty((intervals * d, n, n)),
+        np.empty((d * n, (d + 1) * n)), np.empty((d + 1) * n, np.int64), matrices, product_of(len(matrices), n),
+        np.empty(n), np.empty(n),
+    )  # fmt: skip
+
+
+@kernel(reorder=False, last=True)
+def fill_multipliers(room: Monodromy, known: int) -> int:
+    """Fill in the logarithms, or put right by Liouville's formula those that are ``known``; return what comes of it."""
+    real, imaginary, n = room.real, room.imaginary, room.real.size
+    if not known:
+        for j in range(0 if room.planar else room.h.size):
+            if is_coarse(room, j):
+                return COARSE
+        condense(room.value, room.slope, room.h, room.jacobian, room.block, room.pivots, room.matrices[: room.h.size])
+        fill_logarithms(room.matrices, room.product, real, imaginary)
+        if real[0] != real[0] and not room.planar:  # noqa: PLR0124
+            return NOT_FINITE
+        if room.autonomous and not room.planar and not nearest_to_one(room)[1] <= APART:
+            return DRIFTED
+    total, sum_, least = 0.0, 0.0, math.inf
+    for q in range(room.quadrature.size):
+        trace = 0.0
+        for a in range(n):
+            trace += room.jacobian[q, a, a]
+        total += room.quadrature[q] * trace
+    for a in range(n):
+        sum_, least = sum_ + real[a], min(least, real[a])
+    nearest, count = nearest_to_one(room)[0], 0
+    for a in range(n):
+        count += 1 if real[a] <= least + LOCATED else 0
+    if not room.autonomous or not real[nearest] <= least + LOCATED:  # the error of the one that is 1 shall show
+        for a in range(n):  # over one interval a Gauss method takes e^-1000 for a number near one
+            if real[a] <= least + LOCATED:
+                real[a] += (total - sum_) / count
+    if room.planar:  # the other one is known whatever round-off has made of the one that is 1
+        nearest, error = nearest_to_one(room)
+        one = 0.0 if not error <= APART else real[nearest] if imaginary[nearest] == 0.0 else error
+        real[0], real[1] = max(one, total), min(one, total)
+        imaginary[0] = imaginary[1] = 0.0
+    return KNOWN
+
+
+@helper
+def nearest_to_one(room: Monodromy) -> tuple[int, float]:
+    """Return the place of the logarithm nearest to zero, and its size."""
+    place, least = 0, math.inf
+    for a in range(room.real.size):
+        size = math.hypot(room.real[a], room.imaginary[a])
+        if size < least:
+            place, least = a, size
+    return place, least
+
+
+@helper
+def is_coarse(room: Monodromy, j: int) -> bool:
+    """Return whether perturbations grow and decay too much over an interval, by the eigenvalues in its middle."""
+    n, d, size, growth = room.real.size, room.jacobian.shape[0] // room.h.size, 0.0, 0.0
+    middle = room.jacobian[j * d + d // 2]
+    for a in range(n):  # bounds of both
+        others = 0.0
+        for b in range(n):
+            others += abs(middle[a, b]) if b != a else 0.0
+        size, growth = max(size, others + abs(middle[a, a])), max(growth, others + middle[a, a])
+    if not (room.h[j] * size > room.length and room.h[j] * growth > _GROWS):
+        return False
+    for a in range(n):
+        for b in range(n):
+            room.product.square[0, a, b] = middle[a, b]
+    real, imaginary = room.product.parts[:1], room.product.parts[1:]
+    fill_eigenvalues(room.product.square, n, real, imaginary)
+    size, growth = 0.0, 0.0
+    for a in range(n):
+        size, growth = max(size, math.hypot(real[0, a], imaginary[0, a])), max(growth, real[0, a])
+    return room.h[j] * size > room.length and room.h[j] * growth > _GROWS
+
+
+def resolving(system: Any, room: Monodromy) -> Array:
+    """Return the mesh with intervals divided over which perturbations grow and decay too much."""
+    rates = np.linalg.eigvals(room.jacobian[system.degree // 2 :: system.degree])
+    sizes = np.where(room.h * rates.real.max(axis=1) > _GROWS, room.h * np.abs(rates).max(axis=1), 0.0)
+    parts = np.ceil(sizes / room.length).clip(1, _PARTS).astype(int)
+    pieces = [left + h * np.arange(count) / count for left, h, count in zip(system.mesh, room.h, parts)]
+    return np.append(np.concatenate(pieces), system.mesh[-1])
+
+
+#: Values that are compared in each interval, per degree.
+_LOOKS = 4
+#: Parabolas through three places near an extreme value: the error falls with the sixth power of their distance.
+_PARABOLAS = 2
+
+
+class Curve(NamedTuple):
+    """A piecewise polynomial: ``nodes`` and ``barycentric`` (d + 1,) of its basis, ``mesh`` (N + 1,) from 0 to 1."""
+
+    nodes: Vector
+    barycentric: Vector
+    mesh: Vector
+
+
+def extremes(degree: int, mesh: Array, x: Array, n: int) -> Array:
+    """Return the largest and the smallest value of each state, shape (n, 2); x begins with the states at the nodes.
+
+    The extreme one of several values in each interval is moved to the vertex of the parabola through three places near it.
+    """
+    tables, found = basis(degree), np.empty((n, 2))
+    find(Curve(tables.nodes, tables.barycentric, mesh), _values(degree), x, found)
+    return found
+
+
+@functools.cache
+def _values(degree: int) -> Array:
+    """Return the matrix from the nodal values of an interval to the values that are compared."""
+    tables, count = basis(degree), _LOOKS * degree
+    return interpolation(tables.nodes, tables.barycentric, np.linspace(0, 1, count, endpoint=False))
+
+
+@helper
+def _at(curve: Curve, x: ReadOnlyVector, n: int, state: int, t: float) -> float:
+    """Return the value of a state at a time from 0 to 1."""
+    nodes, barycentric, mesh = curve
+    low, high = 0, mesh.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if mesh[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    s, first = (t - mesh[low]) / (mesh[high] - mesh[low]), low * (nodes.size - 1)
+    above, below = 0.0, 0.0
+    for m in range(nodes.size):
+        value: float = x[(first + m) * n + state]
+        if s == nodes[m]:
+            return value
+        share = barycentric[m] / (s - nodes[m])
+        above += share * value
+        below += share
+    return above / below
+
+
+@kernel(reorder=False, last=True)
+def find(curve: Curve, values: Matrix, x: ReadOnlyVector, found: Matrix) -> None:
+    """Fill the extremes (n, 2) of the states in x; ``values`` (looks, d + 1) takes nodal values to those that are compared."""
+    n, looks, d, mesh = found.shape[0], values.shape[0], curve.nodes.size - 1, curve.mesh
+    for state in range(n):
+        for side in range(2):
+            sign, known, at, apart = 1.0 - 2.0 * side, -math.inf, 0.0, 0.0
+            for j in range(mesh.size - 1):
+                for i in range(looks):
+                    value = 0.0
+                    for m in range(d + 1):
+                        value += values[i, m] * x[(j * d + m) * n + state]
+                    if sign * value > known:
+                        known, apart = sign * value, (mesh[j + 1] - mesh[j]) / looks
+                        at = mesh[j] + i * apart
+            for _ in range(_PARABOLAS):
+                before, here = sign * _at(curve, x, n, state, (at - apart) % 1.0), sign * _at(curve, x, n, state, at % 1.0)
+                behind = sign * _at(curve, x, n, state, (at + apart) % 1.0)
+                bend = before - 2 * here + behind
+                if bend < 0:
+                    at += apart * min(1.0, max(-1.0, (before - behind) / (2 * bend)))
+                apart /= 10
+            found[state, side] = sign * max(known, sign * _at(curve, x, n, state, at % 1.0))

@@ -1,0 +1,190 @@
+"""What becomes of the special points that a step has found, and notes of what was seen and not understood."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin.collocation.corners import Switching
+from contin.core.labels import BY_VALUES, CONFIRMED, Label
+from contin.core.settings import Settings
+from contin.core.trial import Event, Trial
+from contin.events.arc import Arc, SpecialPoint
+from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
+from contin.events.phase_loads import phase_loads
+from contin.events.refinement import refined
+from contin.events.usual import with_normal_form
+from contin.results.point import Point
+
+
+class Notes:
+    """The sentences about a run.
+
+    Attributes
+    ----------
+    texts : list of str
+    primary : str
+        Places are told by this parameter.
+    tolerance : float
+        Of the mesh.
+    moves : bool
+        Mesh points follow corners.
+    is_noisy : bool
+        Some point is not known to the tolerance of Newton's method.
+    """
+
+    def __init__(self, primary: str, tolerance: float, moves: bool) -> None:
+        self.texts: list[str] = []
+        self.primary, self.tolerance, self.moves, self.is_noisy = primary, tolerance, moves, False
+        self._said: set[str] = set()
+
+    def place(self, trial: Trial) -> str:
+        """Return where a point lies."""
+        return f"{self.primary} = {trial[self.primary]:.10g}"
+
+    def add(self, text: str) -> None:
+        self.texts.append(text)
+
+    def inside(self, text: str, arc: Arc) -> None:
+        """Note what was seen inside a step and not understood."""
+        ends = (trial[self.primary] for trial in (arc.before, arc.trial))
+        self.add(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
+
+    def doubts(self, index: Event | None, arc: Arc, found: list[SpecialPoint], doubt: str) -> None:
+        """Note what the labelled points of a step do not explain: a change of the index or, without one, a doubt."""
+        contradicts = contradiction(index, arc, found)
+        if contradicts and not found:  # beside points, changes of the index are noted
+            self.inside(f"{contradicts}, and the labelled points do not explain it", arc)
+        elif doubt and not contradicts:
+            self.inside(doubt, arc)
+
+    def corners(self, trial: Trial) -> None:
+        """Note once that conditions on states make the equations jump, and once that mesh points do not follow them."""
+        tolerance = self.tolerance if self.moves else math.inf
+        for kind, note in (("jump", jump(trial, self.primary)), ("unsettled", unsettled(trial, tolerance, self.primary))):
+            if note and kind not in self._said:
+                self._said.add(kind)
+                self.add(note)
+
+    def phases(self, found: SpecialPoint, error: float) -> None:
+        """Note the phase conditions that load a labelled point, which is known to ``error``."""
+        trial, modes = found.trial, list(finding_of(found.details).arrays.get("kernel", ()))
+        known = trial.newton_error + (self.tolerance if math.isnan(error) else error)
+        for name, load, is_mode in phase_loads(trial.system, trial.x, modes, known):
+            place = f"at {found.label} ({self.place(trial)})"
+            what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
+            self.add(f"phases: {name} {what} and not zero, so the phase condition loads the structure; leave it out")
+
+    def noise(self, arc: Arc, allowed: float) -> None:
+        """Note once that a point is known worse than ``allowed``."""
+        if arc.trial.newton_error > allowed and not self.is_noisy:
+            self.is_noisy = True
+            what = "the updates of Newton's method are round-off above its tolerance: see newton_error"
+            self.inside(f"from here on {what}", arc)
+
+
+def jump(trial: Trial, primary: str) -> str:
+    """Return a note if the equations jump at some place of a solution; "" otherwise."""
+    found = trial.system.switching(trial.x)
+    if not (found.places.size and found.jumps.any()):
+        return ""
+    where = _where(found, int(np.argmax(found.jumps)), trial, primary)
+    return (
+        f"the equations jump where {where}: derivatives leave this out, so special points and stability are not told from "
+        "there on; a SegmentedProblem with one segment on each side of the jump tells them"
+    )
+
+
+def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
+    """Return a note if conditions switch inside intervals of the mesh, and that matters; "" otherwise."""
+    found = trial.system.switching(trial.x)
+    if not (found.places.size and (found.costs > tolerance).any()):
+        return ""
+    where = _where(found, int(np.argmax(found.costs)), trial, primary)
+    return f"no mesh has a point where {where}: from there on the points are as exact as discretization_error says"
+
+
+def _where(found: Switching, at: int, trial: Trial, primary: str) -> str:
+    return f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
+
+
+def why_lost(trial: Trial, is_located: bool) -> str:
+    """Return why a special point has no label: a clause."""
+    if trial.system.switching(trial.x).jumps.any():
+        return "lies where the equations jump"
+    return "was not found again on a finer mesh" if is_located else "was bracketed, and not located"
+
+
+#: The index on both sides of a special point; None where it is not defined.
+IndexChange = tuple[int | None, int | None]
+
+
+def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
+    """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
+    if not found.label or not (found.is_located or found.stop is not None):
+        return found  # a regular point, or one that gets no label
+    labelled = found.label != Label.FAILED and not found.closes
+    first, coarse = found.trial, found.trial.system.coefficient(found)
+    if found.errors is None and labelled and settings.errors:
+        again = refined(found.same_as or found, settings)
+        details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
+        if found.label not in BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
+            errors, is_lost = dict.fromkeys(errors, np.nan), True
+        found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
+    if coarse is not None:
+        better = coarse if found.trial is first else found.trial.system.coefficient(found)
+        found = with_normal_form(found, better or coarse, coarse, settings.errors)
+    return found
+
+
+def is_confirmed(point: SpecialPoint, arc: Arc, notes: Notes) -> bool:
+    """Return whether a special point was located and, where that was asked for, not missed on a finer mesh.
+
+    Others are noted: they get no label. The end of a run keeps its own. So does a point whose errors are not known because
+    Newton's method fails on the finer mesh; that is noted.
+    """
+    what = f"{point.label} {point.name}".strip()
+    unknown = point.label in CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+    if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
+        if point.stop is None and unknown:
+            notes.add(f"{what} at {notes.place(point.trial)}: its ± is nan, since Newton's method failed at the second look")
+        return True
+    notes.inside(f"a possible {what} {why_lost(point.trial, point.is_located)}", arc)
+    return False
+
+
+def index_changes(index: Event | None, arc: Arc, special: Sequence[SpecialPoint], notes: Notes) -> list[IndexChange | None]:
+    """Return the index before and after each special point of a step, and note what contradicts itself."""
+    if index is None or not special:
+        return [None] * len(special)
+    groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
+    middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
+    last = special[-1]  # behind a limit the step does not belong to the branch
+    ends_there = last.stop is not None and last.test is not None and last.same_as is None
+    between = [arc.before, *(arc.near(s) for s in middles), last.trial if ends_there else arc.trial]
+    values = [trial.value(index) for trial in between]
+    whole = [None if np.isnan(value) else int(value) for value in values]
+    changes: list[IndexChange | None] = []
+    for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
+        changes += [pair if nullity_of(point) else None for point in group]
+        if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == Label.FOLD and after == before):
+            name = f"{group[0].label} {group[0].full_name}".strip()
+            notes.add(f"the index goes from {before:g} to {after:g} at {name} ({notes.place(group[0].trial)})")
+    return changes
+
+
+def told(found: SpecialPoint, arclength: float, index: Event | None, change: IndexChange | None, mesh_error: float) -> Point:
+    """Return what is told of a special point, or of a regular one: the point of a branch."""
+    trial, system = found.trial, found.trial.system
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+    stability = Stability() if index is None else system.stability(found)
+    return Point(
+        str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength,
+        trial.iterations, trial.newton_error, found.errors or {}, found.details,
+        stability.index, stability.nullity, change, stability.breaks,
+        *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,
+    )  # fmt: skip
