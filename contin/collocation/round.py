@@ -139,7 +139,8 @@ def is_coarse(room: Monodromy, j: int) -> bool:
     size, growth = 0.0, 0.0
     for a in range(n):
         size, growth = max(size, math.hypot(real[0, a], imaginary[0, a])), max(growth, real[0, a])
-    return room.h[j] * size > room.length and room.h[j] * growth > _GROWS
+    found: bool = room.h[j] * size > room.length and room.h[j] * growth > _GROWS
+    return found
 
 
 def resolving(system: Any, room: Monodromy) -> Array:

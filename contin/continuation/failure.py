@@ -12,10 +12,11 @@ from contin.continuation.points import Notes
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.step import Reason, State, Stop, aims, corrected, judged, predict
+from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError
-from contin.levels import BESIDE, MOST_STEPS
+from contin.levels import BESIDE, MOST_STEPS, ROUGH
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -24,8 +25,8 @@ _STANDING = 6
 _SHORTER = (1e-2, 1e-4)
 #: Looser tolerances that are tried, as multiples of the one that failed: the smallest that goes on is told.
 _LOOSER = (1e3, 1e4, 1e5)
-#: An advice must let the run go on for so many steps, and over ``min_step`` or, with a looser tolerance, as far as a first
-#: step: one step may succeed right before what ends the run.
+#: An advice must let the run go on for so many steps, and over ``min_step`` or, where it is given, to limits or for
+#: `MOST_STEPS`: some steps may succeed right before what ends the run.
 _STEPS = 10
 #: Each of them is tried so much longer than the one before.
 _LONGER = 1.5
@@ -94,11 +95,13 @@ def advice(state: State, settings: Settings) -> str:
     way = settings.min_step
     if _goes_on(state, settings, way):
         return ""
-    for times in _LOOSER:
-        loose = dataclasses.replace(settings.newton, tolerance=times * settings.newton.tolerance)
-        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), settings.step):
+    for tolerance in (times * settings.newton.tolerance for times in _LOOSER):
+        if tolerance > ROUGH:
+            break
+        loose = dataclasses.replace(settings.newton, tolerance=tolerance)
+        if _goes_on(state, dataclasses.replace(settings, newton=loose), np.inf):
             return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
-    if (shorter := _least_step(state, settings)) is not None:
+    if (shorter := _least_step(state, settings, np.inf)) is not None:
         return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
     finer = _on_finer_mesh(state)
     return _mesh_advice(finer.system, settings) if finer is not None and _goes_on(finer, settings, way) else ""
@@ -111,20 +114,22 @@ def shorter_steps(state: State, settings: Settings) -> float | None:
     """
     if settings.min_step != Settings.min_step or _goes_on(state, settings, settings.min_step):
         return None
-    return _least_step(state, settings)
+    return _least_step(state, settings, settings.min_step)
 
 
-def _least_step(state: State, settings: Settings) -> float | None:
+def _least_step(state: State, settings: Settings, way: float) -> float | None:
     """Return the largest of some shorter ``min_step`` with which a run goes on; None where it does with none."""
     shorter = (part * settings.min_step for part in _SHORTER if part * settings.min_step > 0)
-    way = settings.min_step
     return next((step for step in shorter if _goes_on(state, dataclasses.replace(settings, min_step=step), way)), None)
 
 
 def _as_it_is(state: State, settings: Settings) -> str:
     """Return what has been tried in vain, and what the last point looks like."""
     system = state.system
-    tried = [f"steps of {_SHORTER[-1] * settings.min_step:g}", f"a tolerance of {_LOOSER[-1] * settings.newton.tolerance:g}"]
+    loosest = max(
+        (times * settings.newton.tolerance for times in _LOOSER if times * settings.newton.tolerance <= ROUGH), default=0
+    )
+    tried = [f"steps of {_SHORTER[-1] * settings.min_step:g}", *([f"a tolerance of {loosest:g}"] if loosest else [])]
     tried += ["twice the intervals"] if system.refined() else []
     place = [f"{name} = {system.parameter(state.x, name):.6g}" for name in system.free]
     place.append(f"its largest state is {np.max(np.abs(system.states(state.x)), initial=0.0):.3g}")
@@ -156,7 +161,9 @@ def _goes_on(state: State, settings: Settings, way: float) -> bool:
     """Return whether a run with these settings makes some steps from a state, and goes a ``way``."""
     step, gone = settings.min_step, 0.0
     for number in range(MOST_STEPS):
-        if number >= _STEPS and gone >= way:
+        inside = all(low <= state.system.parameter(state.x, name) <= high
+                     for name, (low, high) in settings.limits.items() if name in state.system.free)  # fmt: skip
+        if number >= _STEPS and gone >= way or not inside:
             return True
         trial = _next(state, step, settings)
         while trial is None:
@@ -169,7 +176,7 @@ def _goes_on(state: State, settings: Settings, way: float) -> bool:
         )
         gone += step
         step = min(_LONGER * step, settings.max_step)
-    return False
+    return way == np.inf
 
 
 def _next(state: State, step: float, settings: Settings) -> Trial | None:
@@ -183,9 +190,10 @@ def _next(state: State, step: float, settings: Settings) -> Trial | None:
     return trial if finite and judged(state, guess, trial).turn <= aims(settings, state.system)[0] else None
 
 
-def runs_away(system: Discretization, start: Discretization) -> bool:
+def runs_away(now: Scales, then: Scales) -> bool:
     """Return whether sizes are so much larger than at the start that the numbers there are round-off."""
-    now, then = system.solution.scales, start.solution.scales
+    if now is then:
+        return False
     grown = np.append(now.states / then.states, now.parameters / then.parameters)
     return bool(grown.max() > _FAR)
 
@@ -194,7 +202,7 @@ def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: N
     """Return why a run ends after a step: it has as many points as it may have, goes to infinity, or stands still."""
     if state.accepted >= settings.max_points:
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
-    if primary not in settings.limits and runs_away(trial.system, start):
+    if primary not in settings.limits and runs_away(trial.system.solution.scales, start.solution.scales):
         names = (*(name for name in trial.system.free), "the largest state")
         sizes = (*(trial[name] for name in trial.system.free), np.abs(trial.system.states(trial.x)).max(initial=0.0))
         place = ", ".join(f"{name} = {size:.3g}" for name, size in zip(names, sizes))

@@ -161,7 +161,7 @@ class Continuation:
         while True:
             due, state = self._adapt(), self.state
             lane = None if state.singular else self._lanes.of(state.system, self.settings, self._notes.is_noisy)
-            if lane is None or runs_away(state.system, self.start[0]):
+            if lane is None or runs_away(state.system.scales, self.start[0].scales):
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self.here())

@@ -82,7 +82,7 @@ def test_colours_of_the_palette_are_in_one_place(root):
     files = [path for folder in ("contin", "ribbon_model", "branches", "scripts") for path in (root / folder).rglob("*.py")]
     texts = {path.relative_to(root).as_posix(): path.read_text(encoding="utf-8") for path in files}
     where = {name for name, text in texts.items() if any(f'"{colour}"' in text for colour in Colour if colour != "#000000")}
-    assert where == {"contin/results/colours.py"}
+    assert where == {"contin/results/marks.py"}
     own = re.compile(r"""["'](tab:\w+|red|green|C\d|r|g)["']""")
     assert not [name for name, text in texts.items() if re.search(r"color=" + own.pattern, text)]
 

@@ -92,9 +92,21 @@ def test_advice_for_a_step_that_is_too_long():
     failed = contin.trace(start, free=["a"], min_step=0.2, step=0.2)
     assert (
         failed.points[-1].label == "MX"
-        and failed.stop.advice == "the run goes on with steps of 0.002: set min_step to that or less"
+        and failed.stop.advice == "the run goes on with steps of 2e-05: set min_step to that or less"
     )
-    assert contin.trace(start, free=["a"], min_step=1e-4, step=0.002).stop.reason == "closed"
+    assert contin.trace(start, free=["a"], min_step=2e-5, step=0.2).stop.reason == "closed"
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-3])
+def test_an_advice_that_fails_when_it_is_followed_is_not_given(tolerance):
+    """A reaction of order 1/2 has no positive solution beyond phi = sqrt(12): no step and no tolerance leads there."""
+    dead = BoundaryValueProblem(
+        lambda t, u, p: (u.v, p.phi**2 * u.x**0.5), lambda a, b, p: (a.v, b.x - 1), ["x", "v"], {"phi": 1.0}
+    )
+    first = contin.solve(dead, [1, 0])
+    branch = contin.trace(first, free=["phi"], limits={"phi": (0.5, 6)}, newton=contin.Newton(tolerance=tolerance))
+    assert branch[-1]["phi"] == pytest.approx(12**0.5, abs=0.01)
+    assert "goes on" not in str(branch.stop) and "tolerance of 1" not in str(branch.stop)
 
 
 def test_advice_for_a_mesh(monkeypatch):
