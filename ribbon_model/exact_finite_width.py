@@ -192,7 +192,8 @@ def curve(m, n, parameters, kappa_limits=(-100.0, 100.0), step=0.1, law=FINITE_W
     Raises
     ------
     ValueError
-        See `linear.thresholds`; a law that has an omega_2; or m is a multiple of 2n (the centreline does not close).
+        See `linear.thresholds`; a law that has an omega_2; a first point outside the limits; or m is a multiple of 2n (the
+        centreline does not close).
     RuntimeError
         No point beside the circle is found.
     """
@@ -202,6 +203,8 @@ def curve(m, n, parameters, kappa_limits=(-100.0, 100.0), step=0.1, law=FINITE_W
         raise ValueError(f"the law {law.name!r} has an omega_2: there is no such quadrature")
     branch = _Branch(law, parameters, m, n)
     points, v = [branch.circle(m)], branch.first()
+    if not kappa_limits[0] <= points[0].kappa_n <= kappa_limits[1]:
+        raise ValueError(f"branch ({m}, {n}) starts at kappa_n = {points[0].kappa_n:.6g}, outside {tuple(kappa_limits)}")
     if v is None:
         raise RuntimeError(f"branch ({m}, {n}) could not be left from its circle")
     points.append(branch.point(v))

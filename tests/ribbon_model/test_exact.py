@@ -248,6 +248,8 @@ def test_refusals(monkeypatch):
         end(1, 2, 1.0)
     with pytest.raises(ValueError, match="starts at"):
         curve(1, 2, 0.3, kappa_limits=(-10, 2))
+    with pytest.raises(ValueError, match="starts at"):
+        curve(1, 2, {"nu": 0.3, "Gamma": 8.0}, (-100, 3.2), law="finite width")
     with pytest.raises(ValueError, match="oscillate"):
         residuals(1.0, 0.1, -1e3, 1, 2, 0.3)
     with pytest.raises(ValueError, match="exactly one"):
