@@ -64,7 +64,7 @@ def executor(
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
-        raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
+        raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error.with_traceback(None)
     with client:
         _await_workers(client, scheduler)
         submit = functools.partial(client.get_executor().submit, _alone)

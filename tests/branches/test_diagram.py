@@ -1,6 +1,7 @@
 """Scenes of many branches: the graph, the questions, the executor."""
 
 import contextlib
+import gc
 import itertools
 import json
 import multiprocessing.connection
@@ -368,6 +369,7 @@ def test_a_scheduler_that_is_not_there():
     pytest.importorskip("distributed", reason="Dask is not installed")
     with pytest.raises(ExecutorError, match="no Dask scheduler answers"), executor("nowhere://x"):
         pass
+    gc.collect()  # Dask's client closes itself when it is freed, and waits for ever where that is while another one starts
 
 
 def test_a_scheduler_without_workers_is_refused(tmp_path, call, monkeypatch):
