@@ -70,14 +70,21 @@ class Notes:
                 self._said.add(kind)
                 self.add(note)
 
-    def phases(self, found: SpecialPoint, error: float) -> None:
-        """Note the phase conditions that load a labelled point, which is known to ``error``."""
+    def phases(self, found: SpecialPoint, error: float) -> bool:
+        """Note the phase conditions that load a labelled point, known to ``error``; return whether they make a branch point.
+
+        They do where the kernel is the tangent of the branch, which is not loaded, and one mode, which is.
+        """
         trial, modes = found.trial, list(finding_of(found.details).arrays.get("kernel", ()))
         known = trial.newton_error + (self.tolerance if math.isnan(error) else error)
-        for name, load, is_mode in phase_loads(trial.system, trial.x, modes, known):
+        loads = list(phase_loads(trial.system, trial.x, modes, known))
+        is_made = found.label == Label.BRANCH_POINT and len(modes) == 2 and {is_mode for *_, is_mode in loads} == {True}
+        for name, load, is_mode in loads:
             place = f"at {found.label} ({self.place(trial)})"
             what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
-            self.add(f"phases: {name} {what} and not zero, so the phase condition loads the structure; leave it out")
+            does = "makes this branch point, which gets no label" if is_made else "loads the structure; leave it out"
+            self.add(f"phases: {name} {what} and not zero, so the phase condition {does}")
+        return is_made
 
     def noise(self, arc: Arc, allowed: float) -> None:
         """Note once that a point is known worse than ``allowed``."""

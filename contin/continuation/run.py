@@ -233,7 +233,8 @@ class Continuation:
             if point.stop is not None:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
                 point = with_details(point, self.stop)
-            yield self._point(point, arc.state, change)
+            if point.label != Label.BRANCH_POINT or not self._notes.phases(point, self._accuracy.error):
+                yield self._point(point, arc.state, change)
             if self.stop is not None:
                 return
         self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
@@ -290,6 +291,6 @@ class Continuation:
             accuracy = accuracy_of(trial)
         elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
             accuracy = self._accuracy
-        if found.label:
+        if found.label != Label.BRANCH_POINT and found.label:  # branch points are asked before
             self._notes.phases(found, accuracy.error)
         return told(found, state.arclength + found.at, self._judge.index, change, accuracy.error)

@@ -8,7 +8,8 @@ import re
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve
+from scipy.optimize import brentq, fsolve
+from scipy.special import jv
 
 import contin
 from contin import ProblemError
@@ -69,16 +70,24 @@ def test_a_cut_ring_with_an_end_turned(phase):
     assert name == "lam_phase_" + phase.replace(", ", "_").replace(" ", "_")
 
 
-def test_branch_points_that_a_phase_makes():
-    """An isotropic column buckles at pi^2 (j - 1/2)^2 in both planes; in one of them the phase moves the loads."""
-    strip = OpenStrip(STRAIGHT, finish=FREE_END, numbers={"force_tangent": -1.0}, phases=("spin",))
-    branch = contin.trace(strip.first_point(), free=["force_tangent"], direction=-1, limits={"force_tangent": (-60, 0)})
-    said = "".join(branch.notes)
-    false = [point for point in branch.labelled("BP") if f"BP (force_tangent = {point['force_tangent']:.10g})" in said]
-    true = [point for point in branch.labelled("BP") if point not in false]
-    assert len(false) == len(branch.notes) == 2
-    for point, order in zip(true, (1, 2), strict=True):
-        assert abs(point["force_tangent"] + math.pi**2 * (order - 0.5) ** 2) < 1e-9
+def greenhill(order: int) -> float:
+    """The weight under which a clamped column buckles: J_-1/3((2/3) sqrt(weight)) = 0."""
+    z = np.linspace(0.1, 12, 400)
+    at = np.flatnonzero(np.diff(np.sign(jv(-1 / 3, z))))[order - 1]
+    return (1.5 * brentq(lambda z: jv(-1 / 3, z), z[at], z[at + 1])) ** 2
+
+
+@pytest.mark.parametrize("load", ["force_tangent", "weight"])
+def test_branch_points_that_a_phase_makes(load):
+    """An isotropic column buckles in both planes (Euler, Greenhill); in one the phase moves the loads: no label, a note."""
+    numbers = {load: -1.0 if load == "force_tangent" else 1.0}
+    strip = OpenStrip(STRAIGHT, finish=FREE_END, numbers=numbers, phases=("spin",), weight_direction=(0, 0, -1))
+    sign = numbers[load]
+    branch = contin.trace(strip.first_point(), free=[load], direction=sign, limits={load: tuple(sorted((0, 60 * sign)))})
+    right = [math.pi**2 * (order - 0.5) ** 2 if sign < 0 else greenhill(order) for order in (1, 2)]
+    np.testing.assert_allclose([sign * point[load] for point in branch.labelled("BP")], right, rtol=1e-9)
+    made = [note for note in branch.notes if "makes this branch point, which gets no label" in note]
+    assert made == branch.notes and f"{load} = {'-10.986' if sign < 0 else '49.900'}" in made[0]
 
 
 @pytest.mark.sample(1)
