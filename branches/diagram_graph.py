@@ -6,20 +6,9 @@ from branches.graph.closed import add_branch, course, courses, describe, familie
 from branches.graph.stored import new_graph, read, read_any, save
 
 __all__ = [
-    "add_branch",
-    "course",
-    "courses",
-    "describe",
-    "families",
-    "folds",
-    "new_graph",
-    "pieces",
-    "read",
-    "read_any",
-    "save",
-    "secondaries",
-    "states_at",
-]
+    "add_branch", "course", "courses", "describe", "families", "folds", "new_graph", "pieces", "read", "read_any", "save",
+    "secondaries", "states_at",
+]  # fmt: skip
 
 warnings.warn(
     "branches.diagram_graph is branches.graph.closed and branches.graph.stored from version 0.3 on",

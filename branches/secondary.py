@@ -91,8 +91,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
         There is none.
     """
     if result.is_dir():
-        edges = read(result).edges(data=True)
-        names = sorted({data["file"] for _, _, data in edges if "origin" not in data})
+        names = sorted({data["file"] for _, _, data in read(result).edges(data=True) if "origin" not in data})
         found = {name: read_branch(result / name) for name in names}
     else:
         found = {result.name: read_branch(result)}

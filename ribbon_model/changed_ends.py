@@ -59,8 +59,7 @@ def _values(strip: OpenStrip, before: Mapping[str, float], last: np.ndarray) -> 
     """Return the numbers of a strip whose last end has this quaternion and place; ``before`` are those of the state."""
     q, finish = last[:4], strip.finish
     values = {name: before.get(name, value) for name, value in strip.parameters.items()}
-    stroke = values.get(STROKE, 0.0)
-    place = dict(zip(PLACE, last[4:7] - stroke * np.array(strip.stroke_direction)))
+    place = dict(zip(PLACE, last[4:7] - values.get(STROKE, 0.0) * np.array(strip.stroke_direction)))
     values |= {
         name: before[name] if abs(before.get(name, math.inf) - x) < levels.LOCATED else float(x)
         for name, x in place.items() if name in values
@@ -83,9 +82,8 @@ def held_angles(end: End, q, known: Sequence[float] | None) -> tuple[float, ...]
 def angles_near(q, near) -> tuple[float, float, float]:
     """Return turn, bend and swing of a quaternion; of all that stand for its rotation, those next to the given ones."""
     turn, bend, swing = ends.angles_of(q)
-    found = []
-    for angles in ((turn, bend, swing), (turn + math.pi, math.pi - bend, swing + math.pi)):
-        found.append([a + 2 * math.pi * round((b - a) / (2 * math.pi)) for a, b in zip(angles, near)])
+    both = (turn, bend, swing), (turn + math.pi, math.pi - bend, swing + math.pi)
+    found = [[a + 2 * math.pi * round((b - a) / (2 * math.pi)) for a, b in zip(angles, near)] for angles in both]
     best = min(found, key=lambda angles: math.dist(angles, near))
     return best[0], best[1], best[2]
 

@@ -164,14 +164,11 @@ class _Shooting:
         lab = m1 - (x2 * r3 - x3 * r2), m2 - (x3 * r1 - x1 * r3), m3 - (x1 * r2 - x2 * r1)
         frame = directors(*q)
         moment = np.array([sum(map(operator.mul, frame[at : at + 3], lab)) for at in (0, 3, 6)])
-        strains = self.law.linearized(moment.T, *self.material)[0]
-        return np.array([*spin(*q, *strains.T, 1.0), *frame[6:]]).T
+        return np.array([*spin(*q, *self.law.linearized(moment.T, *self.material)[0].T, 1.0), *frame[6:]]).T
 
     def _missed(self, last: np.ndarray) -> np.ndarray:
         """Return what the conditions at the other end miss, shape (P, loads): those at S = 0 hold."""
-        end = Named(*last.T)
-        conditions = self.boundary(Named(1.0, *np.zeros(6)), end, None)
-        return np.array(conditions[len(self.names) :]).T
+        return np.array(self.boundary(Named(1.0, *np.zeros(6)), Named(*last.T), None)[len(self.names) :]).T
 
     def _improved(self, loads: np.ndarray) -> np.ndarray:
         """Return loads after damped Newton steps; a step that does not lower what is missed is made again with more damping."""

@@ -374,8 +374,7 @@ def _on_primary_branches(strip: Strip, n: int):
     for m in (m for m in _COVERINGS if n and m != n and m % (2 * n)):
         try:
             first = thresholds(law, m, n, parameters)[0]
-            limits = min(first, kappa_n) - 1, max(first, kappa_n) + 1
-            points = exact.curve(m, n, parameters, limits, law=law)
+            points = exact.curve(m, n, parameters, (min(first, kappa_n) - 1, max(first, kappa_n) + 1), law=law)
         except (ValueError, RuntimeError):  # no such branch, or none with a regular start on its circle
             continue
         for one, other in itertools.pairwise(points):

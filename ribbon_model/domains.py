@@ -104,8 +104,7 @@ class Domain:
         if "x1" in system.problem.states:
             states += [zero, (np.cos(2 * half_angle) - 1) / m, np.sin(2 * half_angle) / m]
         moment = law.circle(m, kappa_n, {name: float(known[name]) for name in law.parameters})["M1"]
-        values = dict.fromkeys(system.free, 0.0) | {"kappa_n": kappa_n, "M1": moment}
-        return system.pack(np.array(states).T, values)
+        return system.pack(np.array(states).T, dict.fromkeys(system.free, 0.0) | {"kappa_n": kappa_n, "M1": moment})
 
     def __repr__(self) -> str:
         return f"<{self.name}>"
@@ -122,8 +121,7 @@ class Cell(Domain):
 
     def wave(self, m: int, n: int, kappa_n: float) -> dict[str, float]:
         """Return the parameters of the cell for the branch of the mode n, which leaves the m-covered circle at kappa_n."""
-        sense = math.copysign(1.0, m - kappa_n)
-        return {"length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": sense}
+        return {"length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": math.copysign(1.0, m - kappa_n)}
 
     def wavenumber(self, parameters: Mapping[str, float]) -> int:
         return round(LENGTH / (4 * parameters["length"]))
@@ -145,8 +143,7 @@ def _ends_of_cell(u0, u1, p):
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
     moment = p.sense * math.sqrt(p.M1 * p.M1 + p.M2 * p.M2)
     return (
-        u0.q0 - 1, u0.q1, u0.q2, u0.q3,
-        d21 * p.M1 + d22 * p.M2,
+        u0.q0 - 1, u0.q1, u0.q2, u0.q3, d21 * p.M1 + d22 * p.M2,
         math.cos(p.turn) * d23 * moment - math.sin(p.turn) * (d22 * p.M1 - d21 * p.M2),
     )  # fmt: skip
 

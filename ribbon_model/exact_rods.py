@@ -68,8 +68,7 @@ class Numerics:
     def nodes(self, lower, upper):
         """Return the nodes v, for integrands that have decayed a tail's length outside [lower, upper], shape (nodes,)."""
         spacing = float(self.spacing)
-        count = np.arange((lower - self.tail) // spacing, (upper + self.tail) // spacing)
-        return self.spacing * self.array(count)
+        return self.spacing * self.array(np.arange((lower - self.tail) // spacing, (upper + self.tail) // spacing))
 
     def gradients(self, function, z):
         """Return (value, gradient (2,)) of every result of function(x, y, numerics), by complex steps: exact to round-off."""

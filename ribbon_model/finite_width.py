@@ -223,8 +223,7 @@ def start(M1, M3, kappa_n, section: Plate, narrow=False):
     for _ in range(_ROUNDS):
         z = np.maximum(section.C * w1 * w1, _WIDE)
         part = z * nearly_membrane(z)
-        softer = section.softened(part)
-        w1, w3, _ = ribbon_strains(M1 / part, M3 / part, kappa_n, softer)
+        w1, w3, _ = ribbon_strains(M1 / part, M3 / part, kappa_n, section.softened(part))
     p, m3 = M1 / section.stiff + (section.stiff - section.nu) * kappa_n, M3 / np.sqrt(section.stiff)
     planar = (p < -abs(m3)) & (np.sqrt(p * p + m3 * m3) - p < 2 * section.nu * kappa_n)
     known = known & (section.C * w1 * w1 > _WIDE) & ~planar

@@ -84,5 +84,4 @@ def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
 
 def _turns_about_width(end: End) -> bool:
     """Return whether an end can turn about the width."""
-    about = end.rotation == HINGED and abs(end.axis[0]) > 1 - LOOSE
-    return about or end.rotation in (FREE, JOINT)
+    return (end.rotation == HINGED and abs(end.axis[0]) > 1 - LOOSE) or end.rotation in (FREE, JOINT)

@@ -57,8 +57,7 @@ class Member:
         """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
         own = natural_state.helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
         q = np.array(product(self.frame, tuple(own[:, :4].T))).T
-        axes = np.array(directors(*self.frame)).reshape(3, 3)
-        return np.hstack([q, np.array(self.place) + own[:, 4:] @ axes])
+        return np.hstack([q, np.array(self.place) + own[:, 4:] @ np.array(directors(*self.frame)).reshape(3, 3)])
 
     def followed_by(self, section: str, length: float, strains: Vector = (0.0, 0.0, 0.0)) -> Member:
         """Return a member that goes on where this one ends."""

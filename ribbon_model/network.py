@@ -38,7 +38,7 @@ from contin import (
     VariationalSegment,
     solve,
     trace,
-)
+)  # fmt: skip
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
@@ -56,7 +56,7 @@ from ribbon_model.members import (
     Quaternion,
     numbers_of,
     straight,
-)
+)  # fmt: skip
 from ribbon_model.outlines import fans
 from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section
@@ -395,9 +395,7 @@ class Network:
     def _reader(self, joint: Joint) -> Callable:
         """Return ``read(a, b, p)``: joint frame and place of each end of a joint."""
         order = list(self.members)
-        known = []
-        for each in joint.members:
-            known.append((order.index(each.member), each, numbers_of(self.drawn(each)[:4])))
+        known = [(order.index(each.member), each, numbers_of(self.drawn(each)[:4])) for each in joint.members]
 
         def read(a, b, p):
             found = []
@@ -424,8 +422,7 @@ class Network:
 
     def _floating(self) -> Callable:
         """Return the conditions that hold the rigid motions of a network that floats, at the first end of the first member."""
-        member = next(iter(self.members.values()))
-        drawn, axes = numbers_of(member.drawn([0.0])[0]), self._free_turns
+        drawn, axes = numbers_of(next(iter(self.members.values())).drawn([0.0])[0]), self._free_turns
 
         def conditions(a):
             turned = _from_drawing(a[0][:4], drawn[:4])[1:]
@@ -474,7 +471,7 @@ class Network:
                 self._reader(self.joints[name]),
                 ends.angle_of(end := self.held[name]),
                 self._prescribing(name, end)[0],
-            )
+            )  # fmt: skip
             for number, load in self.loads.items()
             for name, factor in load.moments
         ]
@@ -804,10 +801,8 @@ class Network:
 
     def shapes_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> dict[str, Shape]:
         """Return the same from states (K, n) at parts t (K,) of the lengths and the values of all parameters."""
-        strains, found = self.strains_at(t, states, p), {}
-        for (name, member), places in zip(self.members.items(), self.places):
-            found[name] = shape_of(member.length * t, states[:, places], strains[name])
-        return found
+        strains, members = self.strains_at(t, states, p), zip(self.members.items(), self.places)
+        return {name: shape_of(one.length * t, states[:, places], strains[name]) for (name, one), places in members}
 
     def reactions(self, point: Point) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Return force and moment (3,) on the network at each joint that is held, on the axes of the drawing.
@@ -899,8 +894,7 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
     turned = ends.relative(frame, first)[1:]
     if kind == RIGID:
         return list(turned)
-    pair = ends.perpendicular(ends.unit("axis", axis))
-    return [ends.along(vector, turned) for vector in pair]
+    return [ends.along(vector, turned) for vector in ends.perpendicular(ends.unit("axis", axis))]
 
 
 def _from_drawing(q, drawn: Quaternion) -> tuple:

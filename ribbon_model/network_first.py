@@ -34,8 +34,7 @@ def first_state(network: Network, intervals: int = 10, degree: int = 6, **option
         return network.first_point(None, None, intervals, degree, **options)
     except OutOfReach as error:
         try:
-            guess = downhill(network, error.nearest)
-            point = network.state_near(guess, intervals=intervals, degree=degree, **options)
+            point = network.state_near(downhill(network, error.nearest), intervals=intervals, degree=degree, **options)
         except (ContinError, ValueError):
             raise error from None
         return point, "from the drawing, by descent of its energy"

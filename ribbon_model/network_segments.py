@@ -91,8 +91,7 @@ class Piece(Chain):
     def work(self, forces: np.ndarray) -> np.ndarray:
         """Return the derivative (size,) of the sum of forces (N, 3) . x at the ends of the segments."""
         _, force, torque, _ = self.levers(np.zeros(3), forces)
-        change = np.einsum("ki,kib->kb", force, self.own) + np.einsum("ki,kib->kb", torque, self.turning)
-        found = self.of_strains(change)
+        found = self.of_strains(np.einsum("ki,kib->kb", force, self.own) + np.einsum("ki,kib->kb", torque, self.turning))
         found[:6] = [*np.cross(self.centreline[1:], forces).sum(axis=0), *forces.sum(axis=0)]
         return found
 
@@ -450,9 +449,7 @@ def unsupported(network: Network) -> str:
         return "a network with a universal joint"
     if not network.problem.has_index:
         return "a network with loads that follow"
-    if network.floats and network.loads:
-        return "a network with loads that nothing holds"
-    return ""
+    return "a network with loads that nothing holds" if network.floats and network.loads else ""
 
 
 def cut(network: Network, system: Collocation, x: np.ndarray, segments: int) -> NetworkChain:
@@ -474,7 +471,6 @@ def cut(network: Network, system: Collocation, x: np.ndarray, segments: int) -> 
         strains = network.strains_at(middle, system.evaluate(x, middle), p)[name]
         section, own = network.sections[member.section], first[places[:7]]
         rigid = section.constrained and not getattr(_numbers(network, member.section, numbers), "softness", 0.0) > 0
-        free = (0, 2) if rigid else (0, 1, 2)
-        pieces.append(Piece(member.length, strains, frames(own[None])[0].T, own[4:], free))
+        pieces.append(Piece(member.length, strains, frames(own[None])[0].T, own[4:], (0, 2) if rigid else (0, 1, 2)))
     chain = NetworkChain(network, numbers, tuple(pieces), segments)
     return chain.moved(np.zeros(chain.size))

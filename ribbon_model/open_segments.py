@@ -239,9 +239,7 @@ def unsupported(strip: OpenStrip) -> str:
         return "a strip with a roller"
     if JOINT in (strip.start.rotation, strip.finish.rotation):
         return "a strip with a universal joint"
-    if len(strip.start.held) < 3:
-        return "a strip whose first end can move"
-    return ""
+    return "a strip whose first end can move" if len(strip.start.held) < 3 else ""
 
 
 def cut(strip: OpenStrip, system: Collocation, x: np.ndarray, segments: int) -> OpenChain:

@@ -50,5 +50,4 @@ def secondary_branch(solution: Solution, domain: Domain):
     if not (near and found.tangents):
         raise ValueError(f"nothing leaves the half loop with the {domain.reversal} at kappa_n = {kappa_n:.6g}")
     forces = [system.parameter_index(name) for name in system.free if name.startswith("R")]
-    tangent = max(found.tangents, key=lambda vector: np.abs(vector[forces]).max())
-    return system, found.x, tangent
+    return system, found.x, max(found.tangents, key=lambda vector: np.abs(vector[forces]).max())

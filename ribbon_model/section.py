@@ -193,8 +193,7 @@ class Section:
             row = np.array([factor(0.0, p), *(datum(0.0, p) for datum in natural), *values(0.0, p)], dtype=float)
             table = np.broadcast_to(row[:, None], (len(row), len(t)))
         else:
-            rows = [[factor(s, p), *(datum(s, p) for datum in natural), *values(s, p)] for s in t]
-            table = np.array(rows, dtype=float).T
+            table = np.array([[factor(s, p), *(datum(s, p) for datum in natural), *values(s, p)] for s in t], dtype=float).T
         return table[0], table[1:4], table[4:]
 
     # --- the law along the strip ------------------------------------------------------------------------------------------

@@ -349,8 +349,7 @@ def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
     ValueError
         It cannot be closed: too few segments.
     """
-    middle = (np.arange(segments) + 0.5) * (LENGTH / segments)
-    directors = equilibrium.directors(middle)
+    directors = equilibrium.directors((np.arange(segments) + 0.5) * (LENGTH / segments))
     edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)
     moment = equilibrium.moment - np.cross(edges - directors[:, 2] * (LENGTH / segments / 2), equilibrium.force)
     strains = equilibrium.response(np.einsum("kij,kj->ki", directors, moment))[0]

@@ -56,8 +56,7 @@ class Shape:
         Its rows are the new axes on the lab axes. The third is that of the area that the centreline encloses: on branches from
         a circle it is the direction of the moment. The second is d3 at the beginning, as far as it is perpendicular to that.
         """
-        middle = self.centreline - self.centreline.mean(axis=0)
-        up = np.cross(middle, self.directors[:, 2]).sum(axis=0)
+        up = np.cross(self.centreline - self.centreline.mean(axis=0), self.directors[:, 2]).sum(axis=0)
         up = up / np.linalg.norm(up) if np.linalg.norm(up) > 1e-9 else np.array([0.0, 0.0, 1.0])
         side = self.directors[0, 2] - self.directors[0, 2] @ up * up
         side /= np.linalg.norm(side)
@@ -75,8 +74,7 @@ class Shape:
         turn = 2 * np.outer(axis, axis) - np.eye(3)
         x = (self.centreline[-2::-1] - centre) @ turn + centre
         d = self.directors[-2::-1] @ turn * np.array([-1.0, 1.0, -1.0])[:, None]
-        s = 2 * self.arclength[-1] - self.arclength[-2::-1]
-        return self._joined(Shape(s, x, d, self.eta[-2::-1]))
+        return self._joined(Shape(2 * self.arclength[-1] - self.arclength[-2::-1], x, d, self.eta[-2::-1]))
 
     def mirrored(self) -> Shape:
         """Return both sides of the mirror normal to d3 at S = 0, starting at the far end."""

@@ -218,8 +218,7 @@ def _reversal(symmetry: Symmetry) -> np.ndarray:
     The mirror is normal to e1, or the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for the
     mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
     """
-    image = np.diag([-1.0, 1.0, 1.0])
-    return np.kron(np.diag([1.0, -1.0 if symmetry.mirror else 1.0]), image)
+    return np.kron(np.diag([1.0, -1.0 if symmetry.mirror else 1.0]), np.diag([-1.0, 1.0, 1.0]))
 
 
 @functools.cache

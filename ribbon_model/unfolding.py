@@ -161,13 +161,9 @@ def _trigonometric(w_squared, half):
 
 @takes_parameters
 def first_root(
-    law: Law,
-    parameters: float | Mapping[str, float],
-    theta_n: float = math.pi,
-    ends: tuple[int, int, int] = CLAMPED,
-    largest: float = 6.0,
-    method: str = "closed form",
-) -> float | None:
+    law: Law, parameters: float | Mapping[str, float], theta_n: float = math.pi, ends: tuple[int, int, int] = CLAMPED,
+    largest: float = 6.0, method: str = "closed form",
+) -> float | None:  # fmt: skip
     """Return the smallest xi > 0 with a marginal out-of-plane mode of the arc, to about 1e-12, or None below ``largest``.
 
     Sign changes are bracketed on a fixed grid and closed in by Brent's method, in each factor separately or in the determinant.
@@ -254,6 +250,5 @@ def _grid(low, high, singular):
     uniform = np.linspace(start, high, 2 + int((high - start) / 0.01))
     if singular is None:
         return uniform
-    towards = singular - singular * np.geomspace(1.0, 1e-9, 1200)
-    points = np.union1d(uniform, towards)
+    points = np.union1d(uniform, singular - singular * np.geomspace(1.0, 1e-9, 1200))
     return points[(points >= start) & (points <= high) & (points < singular)]

@@ -25,8 +25,7 @@ def standing(shape: Shape | Structure, up: tuple[float, float, float] = DIRECTIO
     ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
     x = np.array(ahead) - z * (z @ ahead)
     x /= np.linalg.norm(x)
-    axes = np.array([x, np.cross(z, x), z])
-    return moved(shape, axes, np.zeros(3))
+    return moved(shape, np.array([x, np.cross(z, x), z]), np.zeros(3))
 
 
 def moved(shape, axes: np.ndarray, by: np.ndarray, scale: float = 1.0):

@@ -87,8 +87,7 @@ def reach_of(shapes, width: float, view: View = OBLIQUE) -> float:
     """Half the side of the square in which all these strips have room."""
     there = [part.surface(width).reshape(-1, 3) for shape in shapes for part in parts_of(shape)]
     there += [solid.vertices for shape in shapes for _, solid in solids_of(shape, width)]
-    corners = np.concatenate(there)
-    return 1.03 * float(np.abs(corners @ view.axes[:2].T).max())
+    return 1.03 * float(np.abs(np.concatenate(there) @ view.axes[:2].T).max())
 
 
 def draw_strip(axes, shape, width: float, reach: float, view: View = OBLIQUE, pixels: int = PIXELS) -> None:
@@ -111,8 +110,7 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     for one, solid in solids_of(shape, width):
         samples.append(_flat_samples(solid, _FORCE if one.number else _SUPPORT if one.held else _JOINT, scale))
     points, normals, paint = (np.concatenate(column) for column in zip(*samples))
-    screen = points @ view.axes.T
-    place, nearness = _places(screen, reach, fine)
+    place, nearness = _places(points @ view.axes.T, reach, fine)
     seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
     seen = seen[place[seen] >= 0]
     nearest = np.full(fine * fine, -1)

@@ -228,8 +228,7 @@ def _table(shape: Shape, strains) -> bytes:
 def _csv(columns: dict[str, ndarray]) -> bytes:
     """Return columns as comma-separated values with a line of names, numbers with all their digits."""
     rows = zip(*(column.tolist() for column in columns.values()))
-    lines = [",".join(columns), *(",".join(map(str, row)) for row in rows)]
-    return ("\n".join(lines) + "\n").encode()
+    return ("\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n").encode()
 
 
 def _mesh(branch: StoredBranch, shape: Shape, length: float, options):

@@ -105,8 +105,7 @@ def _slopes(s: np.ndarray, values: np.ndarray, owner: np.ndarray) -> tuple[np.nd
     """
     from scipy.linalg import solve_banded
 
-    ends = owner[1:] != owner[:-1]
-    h = np.where(ends, 1.0, np.diff(s))
+    h = np.where(owner[1:] != owner[:-1], 1.0, np.diff(s))
     secants = np.diff(values, axis=0) / h[:, None]
     counts = np.bincount(owner)
     first, last = np.cumsum(counts) - counts, np.cumsum(counts) - 1

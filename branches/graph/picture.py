@@ -414,7 +414,7 @@ def _line(graph, m: int, n: int, edges) -> Line:
             node["kind"],
             node.get("covering"),
             node["what"] if node["kind"] == "end" else "",
-        )
+        )  # fmt: skip
         for node in nodes
     ]
     line = Line(name, n, kappa_n, kappa_star, index, marks)

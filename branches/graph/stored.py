@@ -82,8 +82,7 @@ def read_any(folder: str | Path):
     path = Path(folder)
     path = path / DIAGRAM if path.is_dir() else path
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        graph = networkx.node_link_graph(data, edges="edges")
+        graph = networkx.node_link_graph(json.loads(path.read_text(encoding="utf-8")), edges="edges")
         if graph.graph["format"] == CLOSED_FORMAT:
             _check(graph)
         elif graph.graph["format"] != OPEN_FORMAT:

@@ -59,8 +59,7 @@ def curves(folder: Path) -> Section:
         f"ν = {NU:g}.",
         "Rods: no fold on any primary branch (m, n ≤ 7) at ν = .3. Between rod and ribbon see the finite-width law.",
     ]
-    title = "Folds and a secondary bifurcation against ν, ribbon"
-    return Section(title, rows, [_draw(lines, line, last, folder)], notes)
+    return Section("Folds and a secondary bifurcation against ν, ribbon", rows, [_draw(lines, line, last, folder)], notes)
 
 
 def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
@@ -70,8 +69,7 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
     """
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
-    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
-    fold = branch.labelled(Label.FOLD)[0]
+    fold = trace(point_of(system, x), settings, tangent=tangent, progress=False).labelled(Label.FOLD)[0]
     moments = [part * fold["M2"] for part in PARTS]
     limits = {"nu": (LOWEST, HIGHEST), "kappa_n": (-200, 200), "M2": (moments[0], 100)}
     options = {"limits": limits, "zeros": {"nu": NUS, "M2": moments[1:]}, "progress": False}

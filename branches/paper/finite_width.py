@@ -86,8 +86,7 @@ def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     """(Gamma, kappa_n) of the fold of (1, 2), shape (K, 2), Gamma ascending; and of the place where it is born."""
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, {"nu": NU, "Gamma": 10.0}, 10, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
-    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
-    fold = branch.labelled(Label.FOLD)[0]
+    fold = trace(point_of(system, x), settings, tangent=tangent, progress=False).labelled(Label.FOLD)[0]
     options = {"limits": {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}, "zeros": {"Gamma": CHECKED[1:]}, "progress": False}
     up, down = (curve(fold, "Gamma", direction=sense, **options) for sense in (1, -1))
     (birth,) = down.labelled(Label.BRANCH_POINT)  # the last point

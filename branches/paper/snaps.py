@@ -101,8 +101,7 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
     monitors = SymmetryWatch(law, system, x).monitors if label == "SB" else ()
     settings = Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, events=monitors)
-    branch = trace(point_of(system, x), settings, tangent=tangent, progress=False)
-    point = branch.labelled(label)[at]
+    point = trace(point_of(system, x), settings, tangent=tangent, progress=False).labelled(label)[at]
     strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
     kappa_n = past(point["kappa_n"], side)
     strip = replace(strip, kappa_n=kappa_n)

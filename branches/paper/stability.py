@@ -41,8 +41,7 @@ def fig12b(folder: Path) -> Section:
         "up to the first fold; unstable past a subcritical one. The paper draws the result for the ribbon only.",
         "No contact, no friction: a multi-covered circle lies in itself.",
     ]
-    pictures = [_draw(found, folder)]
-    return Section("Fig. 12b: where stable states exist, ν = .3", rows, pictures, notes)
+    return Section("Fig. 12b: where stable states exist, ν = .3", rows, [_draw(found, folder)], notes)
 
 
 def _interval(low, high) -> str:

@@ -258,9 +258,7 @@ def trouble(error: BaseException) -> str:
     """Return the reason why a job gave no result."""
     if isinstance(error, TimeoutError):
         return "not finished within the time limit"
-    if isinstance(error, WorkerDied):
-        return str(error)
-    return f"{type(error).__name__}: {error}"
+    return str(error) if isinstance(error, WorkerDied) else f"{type(error).__name__}: {error}"
 
 
 #: A source of jobs returns this if its next job depends on running jobs.

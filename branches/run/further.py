@@ -38,8 +38,7 @@ def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
     rows = list(chosen_rows(branch))
     with Progress("places searched", len(rows), quiet) as progress:
         for row in rows:
-            stage = int(branch.points["stage"][row])
-            column = branch.followed(stage)
+            column = branch.followed(int(branch.points["stage"][row]))
             known = states_at(branch, row)
             if known:
                 progress.part(column)

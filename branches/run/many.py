@@ -152,8 +152,7 @@ def _stored_scenes(sweep: Sweep, folder: Path) -> Mapping[str, Scene]:
     if not (folder / DIAGRAM).exists():
         return {}
     try:
-        stored = parse(read_any(folder).graph["config"], DIAGRAM)
-        return stored.scenes
+        return parse(read_any(folder).graph["config"], DIAGRAM).scenes
     except (StoreError, ConfigError, KeyError) as error:
         raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {ANOTHER_DIAGRAM}") from error
 

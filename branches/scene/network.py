@@ -128,11 +128,8 @@ class NetworkStageConfig(FollowConfig):
 
     held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints from here on (as before)")
     phase: int | None = Field(
-        None,
-        ge=1,
-        le=20,
-        description="of a loop that floats: hold the sine of so many waves, so that it cannot shift",
-    )
+        None, ge=1, le=20, description="of a loop that floats: hold the sine of so many waves, so that it cannot shift",
+    )  # fmt: skip
 
 
 class NetworkDirections(Strict):
@@ -190,8 +187,7 @@ class NetworkScene(StagedScene):
             raise ValueError("stage 1: held, numbers: those of the scene are the first stage's")
         self.check_stages([f"{column(name)}_{axis}" for name in self.strip().joints for axis in "xyz"])
         networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
-        numbers = {name for network in networks for name in network.parameters}
-        names = [*numbers, *self.found_names, *OWN]
+        names = [*({name for network in networks for name in network.parameters}), *self.found_names, *OWN]
         for name, times in Counter([*names, *(f"error_{name}" for name in names)]).items():
             if times > 1:
                 raise ValueError(f"{name}: is the name of two columns; give a load, joint or number another name")
@@ -292,8 +288,7 @@ class NetworkScene(StagedScene):
                 for place in joint.strips
                 for piece, end, goes_on in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
             ]
-            kind = BALL if joint.ball else RIGID if joint.hinge is None else HINGE
-            joints[name] = Joint(ends, kind, hinge)
+            joints[name] = Joint(ends, BALL if joint.ball else RIGID if joint.hinge is None else HINGE, hinge)
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
         for name in changed:
             if name not in joints:

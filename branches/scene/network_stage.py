@@ -122,9 +122,7 @@ class NetworkStage(OpenStage):
             joint, direction, _ = forces[0]
             return f"{column(joint)}_{_AXES[int(np.argmax(np.abs(direction)))]}"
         joint, _, move = name.rpartition("_")
-        if move in MOVES and joint in network.held:
-            return f"F_{joint}_{move[1]}"
-        return "energy"
+        return f"F_{joint}_{move[1]}" if move in MOVES and joint in network.held else "energy"
 
     def told_values(self, point: Point) -> list[tuple[str, float]]:
         value = self.found(point).get(self.conjugate, point["energy"])

@@ -319,8 +319,7 @@ class OpenStage(Stage):
         return absent | found
 
     def errors(self, point: Point) -> Mapping[str, float]:
-        found = errors_of(point, lambda at: {**at.functionals, **self.found(at)})
-        return found | point.errors
+        return errors_of(point, lambda at: {**at.functionals, **self.found(at)}) | point.errors
 
     def found(self, point: Point) -> dict[str, float]:
         """Return the potential and the reactions."""

@@ -65,8 +65,7 @@ class NetworkBranch(OpenBranch):
 
     @property
     def up(self) -> tuple[float, float, float]:
-        strip = self.scene.strip()
-        return tuple(-x for x in strip.weight_direction)
+        return tuple(-x for x in self.scene.strip().weight_direction)
 
     @property
     def view(self) -> View:

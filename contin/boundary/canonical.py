@@ -92,14 +92,10 @@ def canonical(variation: Variation) -> Canonical:
     inside = _Inside(variation, ends.sigmas)
     functionals = {name: inside.function(f"functional {name}", [value], True) for name, value in inside.columns().items()}
     return Canonical(
-        inside.function("rhs", [*inside.rates, *inside.forces]),
-        ends.function(),
-        inside.function("integrals", inside.load, len(inside.load) == 1) if inside.load else None,
-        functionals,
-        inside.function("legendre", inside.pivots) if inside.pivots else None,
-        ends.sigmas,
-        ends.fixed,
-    )
+        inside.function("rhs", [*inside.rates, *inside.forces]), ends.function(),
+        inside.function("integrals", inside.load, len(inside.load) == 1) if inside.load else None, functionals,
+        inside.function("legendre", inside.pivots) if inside.pivots else None, ends.sigmas, ends.fixed,
+    )  # fmt: skip
 
 
 def _named(names: Sequence[str], values: Sequence[Any]) -> Any:

@@ -200,8 +200,7 @@ class Fields(Spectral, Collocation):
                 values = np.linalg.eigvals(inverse(pencil.shift)(np.eye(count)))
             except RuntimeError:  # no shift has an inverse
                 return np.full(2, np.nan, dtype=complex)
-            finite = values[np.abs(values) > DEPENDENT * np.abs(values).max(initial=0.0)]
-            found = pencil.shift + 1 / finite
+            found = pencil.shift + 1 / values[np.abs(values) > DEPENDENT * np.abs(values).max(initial=0.0)]
         found = found[np.lexsort((-found.imag, -found.real))]
         kept = max(_KEPT, 2 + int(np.count_nonzero(found.real > 0)))
         if kept < len(found) and found[kept].imag < 0:
@@ -238,8 +237,7 @@ class Fields(Spectral, Collocation):
 
     def _by_nodes(self, values: Array, slopes: Array | None = None) -> Entries:
         """Return the entries by the states at the nodes of rows (N d, r, n) by those at Gauss points, and by their slopes."""
-        places = np.tile(self.basis.value, (self.intervals, 1))
-        found = np.einsum("qm,qrb->qrmb", places, values)
+        found = np.einsum("qm,qrb->qrmb", np.tile(self.basis.value, (self.intervals, 1)), values)
         if slopes is not None:
             found += np.einsum("qm,rb->qrmb", np.tile(self.basis.slope, (self.intervals, 1)), slopes)
         rows = np.arange(found.shape[0] * found.shape[1]).reshape(*found.shape[:2], 1, 1)

@@ -93,16 +93,9 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
 
     stated = [f"{name}_{j}" for j in range(times) for name in names]
     return OscillatingField(
-        rhs,
-        boundary,
-        stated,
-        {**field.parameters, PERIOD: 1.0},
-        _phase_condition(phase, count, times),
-        field.domain,
-        _columns(field, list(phase), times),
-        field=field,
-        times=times,
-    )
+        rhs, boundary, stated, {**field.parameters, PERIOD: 1.0}, _phase_condition(phase, count, times), field.domain,
+        _columns(field, list(phase), times), field=field, times=times,
+    )  # fmt: skip
 
 
 def _phase_condition(phase: Mapping[int, tuple[Any, Any]], count: int, times: int) -> Function:

@@ -401,8 +401,7 @@ def _pairs(pieces: _Pieces) -> _Pieces:
     q[:, : n + m, : n + m] += first.q
     g = second.g @ middle
     g[:, :, : n + m] += first.g
-    b = np.concatenate([second.phi @ first.b, second.b], axis=2)
-    return _Pieces(second.phi @ first.phi, b, q, g)
+    return _Pieces(second.phi @ first.phi, np.concatenate([second.phi @ first.b, second.b], axis=2), q, g)
 
 
 def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:

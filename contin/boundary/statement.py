@@ -115,8 +115,7 @@ class BoundaryValueProblem(Restated):
         if self._counts["rhs"] != len(self.state_names):
             given = ", ".join(self.state_names[:8])
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
-        known = (*self.parameters, *self.state_names)
-        self._keep(phases=checks.chosen("phases", self.phases, known))
+        self._keep(phases=checks.chosen("phases", self.phases, (*self.parameters, *self.state_names)))
         for name, function in checks.mapping("rates", self.rates, "functions").items():
             checks.chosen("rates", [name], self.state_names)
             if argument_count(checks.function(f"rates: {name}", function)) != 4:
@@ -129,8 +128,7 @@ class BoundaryValueProblem(Restated):
         degree: int = 0,
     ) -> Collocation:  # fmt: skip
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
-        kind = Fields if self.rates else Collocation
-        return kind(self, mesh, degree, free, parameters, scales)
+        return (Fields if self.rates else Collocation)(self, mesh, degree, free, parameters, scales)
 
     def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states for one that a user gives."""
@@ -274,8 +272,7 @@ class BoundaryValueProblem(Restated):
     def _compiled(self, name: str) -> Batch:
         u, p = self.state_names, tuple(self.parameters)
         if name == "boundary":
-            shape = _shape(self.boundary, self._of_ends, self.boundary_size)
-            return Batch([self.boundary], [shape], u, p, ends=True)
+            return Batch([self.boundary], [_shape(self.boundary, self._of_ends, self.boundary_size)], u, p, ends=True)
         if name == "functionals":
             functions = list(self.functionals.values())
             if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):

@@ -101,8 +101,7 @@ class OnMesh(System):
     @property
     def nodes(self) -> Array:
         """Values of t at all nodes, shape (N d + 1,)."""
-        inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
-        return np.append(inner, self.mesh[-1])
+        return np.append((self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel(), self.mesh[-1])
 
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (N d + 1, n)."""

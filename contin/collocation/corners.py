@@ -300,8 +300,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
     def largest(times: Array, places: Array, which: Indices) -> Array:
         """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
         gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
-        away = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0])
-        return _of_selection(selections, gaps / units, which, away)
+        return _of_selection(selections, gaps / units, which, np.abs(times - places[:, None]) / (mesh[-1] - mesh[0]))
 
     def worst(places: Array, ends: Array, which: Indices) -> Array:
         """Return the largest gap of each switch between its place and an end, shape (K,)."""

@@ -53,8 +53,7 @@ def homoclinic_points(system: ConnectionEquations) -> list[Event]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
-    why = "the ends of the orbit are far from the saddle: it needs a longer time"
-    near = Event("EP", why, _closeness, terminal=True)
+    near = Event("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True)
     if system.problem.saddle_node:
         others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
         return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
@@ -230,8 +229,7 @@ def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) 
     """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
 
     def value(trial: Trial) -> float:
-        complex_pair = _is_complex(_leading(trial, side)[0])
-        return float("nan") if complex_pair else function(trial)
+        return float("nan") if _is_complex(_leading(trial, side)[0]) else function(trial)
 
     return Event(label, name, value)
 

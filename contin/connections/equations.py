@@ -345,8 +345,7 @@ class ConnectionEquations(Conditioned):
 
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of these conditions by any parameters."""
-        by_parameters = self._conditions_at_ends(x, names)[2]
-        return by_parameters * self.scales.parameters[self._indices(names)]
+        return self._conditions_at_ends(x, names)[2] * self.scales.parameters[self._indices(names)]
 
     # --- in one call of a kernel -----------------------------------------------------------------------------------
 
@@ -493,8 +492,7 @@ class ConnectionEquations(Conditioned):
     def _carried(self, other: System) -> Array:
         """Return the reference as a vector of unknowns of another system of this problem."""
         states = self.states(self.reference)
-        names = list(self.problem.parameters)
-        return other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
+        return other.pack(states, dict(zip(self.problem.parameters, self.all_parameters(self.reference))))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""

@@ -194,8 +194,7 @@ def runs_away(now: Scales, then: Scales) -> bool:
     """Return whether sizes are so much larger than at the start that the numbers there are round-off."""
     if now is then:
         return False
-    grown = np.append(now.states / then.states, now.parameters / then.parameters)
-    return bool(grown.max() > _FAR)
+    return bool(np.append(now.states / then.states, now.parameters / then.parameters).max() > _FAR)
 
 
 def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: Discretization) -> Stop | None:

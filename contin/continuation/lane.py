@@ -79,8 +79,7 @@ _NO_WORSE = 2.0
 
 
 def lane_of(
-    system: Discretization, settings: Settings, start: Start, tests: Sequence[Event], own: Sequence[Event],
-    noisy: bool,
+    system: Discretization, settings: Settings, start: Start, tests: Sequence[Event], own: Sequence[Event], noisy: bool,
 ) -> Lane | None:  # fmt: skip
     """Return the lane of a run; None where every step must be made one by one.
 
@@ -128,8 +127,7 @@ class Lane(ABC):
     """
 
     def __init__(
-        self, system: Any, settings: Settings, start: Start, tests: Sequence[Event], others: Sequence[Event],
-        noisy: bool,
+        self, system: Any, settings: Settings, start: Start, tests: Sequence[Event], others: Sequence[Event], noisy: bool,
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
         self._handed: Handed | None = None
@@ -181,8 +179,7 @@ class Lane(ABC):
             state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0, state.discretization_error,
         )  # fmt: skip
         self._handed = None
-        made = self._make(path, state.accepted, int(bent), here)
-        return Block(self.system, state, path, made, self._handed)
+        return Block(self.system, state, path, self._make(path, state.accepted, int(bent), here), self._handed)
 
     def _trial(self, path: Path, number: int, factors: Factorization | None = None) -> Trial:
         """Return the point of a row of a path, with factors right there if these are at hand."""
@@ -412,8 +409,7 @@ class Block:
         # copies begin where all arrays do: some of OpenBLAS's kernels add up in an order that hangs on that
         there = x[row].copy(), tangents[row].copy(), tangents[row - 1].copy()
         return State(
-            base.system, *there, step, following, sign, arclength, base.accepted + row - 1, False, sense,
-            sensed, error,
+            base.system, *there, step, following, sign, arclength, base.accepted + row - 1, False, sense, sensed, error,
         )  # fmt: skip
 
     def _free(self, x: Array) -> Array:

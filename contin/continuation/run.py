@@ -75,15 +75,9 @@ class Continuation:
     """
 
     def __init__(
-        self,
-        system: Discretization,
-        x: Array,
-        settings: Settings = Settings(),
-        tangent: Array | None = None,
-        state: State | None = None,
-        start: Start | None = None,
-        singular: bool = True,
-    ) -> None:
+        self, system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None,
+        state: State | None = None, start: Start | None = None, singular: bool = True,
+    ) -> None:  # fmt: skip
         self.stop: Stop | None = None
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         check(system, settings)

@@ -416,8 +416,7 @@ class _FirstPoint:
     def _kept(self, v: Array, kept: Pattern) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""
         count = len(self.system.problem.states)
-        kept_states = np.tile(kept[:count], self.system.state_size // count)
-        return v * np.concatenate([kept_states, kept[count:]])
+        return v * np.concatenate([np.tile(kept[:count], self.system.state_size // count), kept[count:]])
 
 
 def _has_settled(numbers: Sequence[float]) -> bool:

@@ -100,8 +100,7 @@ def _differences(function: Callable[[float], Any], middle: Array, order: int, h:
     total = np.zeros((2, *middle.shape))
     for k in range(count):
         ahead, behind = (np.asarray(function(s * (k + 1) * h), dtype=float) for s in (1, -1))
-        side = ahead - behind if order % 2 else ahead + behind - 2 * middle
-        total += np.multiply.outer(weights[:, k], side)
+        total += np.multiply.outer(weights[:, k], ahead - behind if order % 2 else ahead + behind - 2 * middle)
     return total / h**order
 
 

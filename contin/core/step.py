@@ -241,8 +241,7 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     if small is not None:
         linear = Linearization(small.tangent, small.sign, DenseFactors(small.matrix))
         return Trial(state.system, small.x, linear, small.iterations, small.error)
-    done = correct(state.system, guess, row, row @ state.x + step, newton, linearize=True)
-    return trial_of(state.system, done, row)
+    return trial_of(state.system, correct(state.system, guess, row, row @ state.x + step, newton, linearize=True), row)
 
 
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:

@@ -140,8 +140,7 @@ class System(Discretization):
     def pack(self, states: object, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from states and the mapping of free parameters."""
         scaled = np.asarray(states, dtype=float).reshape(-1, self.scales.states.size) / self.scales.states
-        free = np.array([float(values[name]) for name in self.free])
-        return np.concatenate([scaled.ravel(), free / self.free_scales])
+        return np.concatenate([scaled.ravel(), np.array([float(values[name]) for name in self.free]) / self.free_scales])
 
     def all_parameters(self, x: Array) -> Array:
         """Return the values of all parameters, shape (number of names,), the free ones from x."""
@@ -179,8 +178,7 @@ class System(Discretization):
     @property
     def unscaled_factors(self) -> Array:
         """Sizes of all unknowns, shape (size,)."""
-        count = self.state_size // self.scales.states.size
-        return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
+        return np.concatenate([np.tile(self.scales.states, self.state_size // self.scales.states.size), self.free_scales])
 
     @functools.cached_property
     def circles(self) -> Array:

@@ -128,8 +128,7 @@ def forced_cycle_in_phase(
         return system.lifted(later, reference)
 
     def apart(place: tuple[float, float]) -> float:
-        gap = orbit(place) - reference
-        return float(system.weights @ gap**2)
+        return float(system.weights @ (orbit(place) - reference) ** 2)
 
     nearest = min(places, key=apart)
     return orbit(nearest), [moved(vector, nearest) for vector in vectors]
@@ -139,8 +138,7 @@ def map_in_phase(system: MapEquations, x: Array, vectors: Sequence[Array], refer
     """Return a cycle of a map, which may begin with any of its points, and vectors at it, to lie closest to another one."""
 
     def apart(shift: int) -> float:
-        gap = system.lifted(system.moved(x, shift), reference) - reference
-        return float(system.weights @ gap**2)
+        return float(system.weights @ (system.lifted(system.moved(x, shift), reference) - reference) ** 2)
 
     nearest = min(range(system.rounds), key=apart)
     turned = [vector.copy() for vector in vectors]

@@ -183,8 +183,7 @@ class PeriodicEquations(Collocation):
         gains = self.gains / self.scales.states
         parts = [states @ np.linalg.matrix_power(self.turn, k).T + gains[k] for k in range(self.order)]
         values = np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
-        mesh = (np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order
-        return np.append(mesh, 1.0), values.ravel()
+        return np.append((np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order, 1.0), values.ravel()
 
     # --- stability -----------------------------------------------------------------------------------------------
 

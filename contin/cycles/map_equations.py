@@ -48,8 +48,7 @@ class MapEquations(AlgebraicEquations):
     order, autonomous = 1, False
 
     def __init__(
-        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None,
-        scales: Scales | None = None,
+        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None, scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, free, parameters)
         values = dict(zip(problem.parameters, map(float, self.parameters)))

@@ -366,8 +366,7 @@ class CycleForm(Form):
     def _mean(self, v: Numbers, w: Numbers) -> Any:
         """Return the mean of v.w over the period, in the user's units."""
         size = self.system.state_size
-        weights = self.system.weights[:size] * self.system.unscaled_factors[:size] ** 2
-        return weights @ (v[:size] * w[:size])
+        return (self.system.weights[:size] * self.system.unscaled_factors[:size] ** 2) @ (v[:size] * w[:size])
 
     def _direction(self, v: Numbers) -> Direction:
         """Return the states at the nodes, interpolated to the Gauss points, and the change of the period."""

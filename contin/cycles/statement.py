@@ -237,8 +237,7 @@ class CycleProblem(BoundaryValueProblem):
         field = returning(field, signature)
         check_field(field, signature, _FORCED if forced else _AUTONOMOUS)
         field, kept_mass = _with_mass(field, mass, names, forced)
-        count = len(names)
-        turn = _turn(symmetry, forced, count)
+        turn = _turn(symmetry, forced, len(names))
         check_equivariance(field, turn, names, parameters)
         check_lattice(turn, names, periods)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
@@ -248,8 +247,7 @@ class CycleProblem(BoundaryValueProblem):
         self._keep(field=field, means=means, period=found, symmetry=turn, order=order_of(turn), angles=periods, mass=kept_mass)
         own = {**({ROUNDS: 1.0} if forced else {PERIOD: 1.0}), **windings}
         super().__init__(rhs, _periodic(turn, names, periods), names, {**parameters, **own})
-        columns = [*extremes, PERIOD] if forced else extremes
-        self._keep(functionals={**dict.fromkeys(columns, found_elsewhere), **means})
+        self._keep(functionals={**dict.fromkeys([*extremes, PERIOD] if forced else extremes, found_elsewhere), **means})
         if periods:
             check_periodic("field", self.batch("field"), periods, self.parameters)
 
@@ -447,8 +445,7 @@ class CycleProblem(BoundaryValueProblem):
         """
         if self.period is None:
             return parameters[PERIOD]
-        values = named_values(tuple(parameters))
-        value = self.period(values(**parameters))
+        value = self.period(named_values(tuple(parameters))(**parameters))
         if not checks.is_number(value) or not 0 < value < math.inf:
             raise ProblemError(f"period: {checks.shown(value)} must be a positive number")
         return float(value * parameters[ROUNDS])

@@ -313,11 +313,8 @@ class EventCurve(Defining):
     """
 
     def __init__(
-        self,
-        base: Any,
-        event: Event,
-        gradient: Callable[[Any, Array], Array] | None = None,
-    ) -> None:
+        self, base: Any, event: Event, gradient: Callable[[Any, Array], Array] | None = None,
+    ) -> None:  # fmt: skip
         super().__init__(base)
         self.event, self._gradient = event, gradient
 

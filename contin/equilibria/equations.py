@@ -85,12 +85,8 @@ class AlgebraicEquations(Spectral, System):
     gain: Array | None = None
 
     def __init__(
-        self,
-        problem: Any,
-        free: Sequence[str],
-        parameters: Mapping[str, float] | None = None,
-        scales: Scales | None = None,
-    ) -> None:
+        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None, scales: Scales | None = None,
+    ) -> None:  # fmt: skip
         super().__init__(problem, free, parameters or {}, scales)
         self.state_size = len(problem.state_names)
         self.size = self.state_size + len(self.free)
@@ -115,8 +111,7 @@ class AlgebraicEquations(Spectral, System):
 
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
-        states = x[: self.state_size].reshape(1, -1)
-        return states * self.scales.states
+        return x[: self.state_size].reshape(1, -1) * self.scales.states
 
     def lifted(self, x: Array, reference: Array) -> Array:
         """Return x with angles moved by whole rounds, so that they are nearest to those of a reference."""
@@ -336,8 +331,7 @@ class AlgebraicEquations(Spectral, System):
         """Return the values of the problem's functionals, in their order."""
         if not self.problem.functionals:
             return np.empty(0)
-        batch = self.problem.batch("functionals")
-        return batch.values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
+        return self.problem.batch("functionals").values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
         """Return the derivatives of a parameter or functional by x, shape (size,)."""
@@ -368,8 +362,7 @@ class AlgebraicEquations(Spectral, System):
             jacobian = abs(scaled._jacobian(at)[1])
             return jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
 
-        rows = usual(largest_entries(entries, z))
-        return self._with(scales=Scales(states, parameters, {"residual": rows})), z
+        return self._with(scales=Scales(states, parameters, {"residual": usual(largest_entries(entries, z))})), z
 
     def without_scales(self, x: Array) -> tuple[AlgebraicEquations, Array]:
         """Return the same problem in the user's units, and x for it."""
@@ -378,8 +371,7 @@ class AlgebraicEquations(Spectral, System):
 
     def _with(self, **changes: Any) -> AlgebraicEquations:
         """Return the same with other free parameters, parameters or scales."""
-        values = dict(zip(self.problem.parameters, self.parameters))
-        kept = {"free": self.free, "parameters": values, "scales": self.scales}
+        kept = {"free": self.free, "parameters": dict(zip(self.problem.parameters, self.parameters)), "scales": self.scales}
         return type(self)(self.problem, **{**kept, **changes})
 
     def carrier(self, other: Discretization) -> Carrier:

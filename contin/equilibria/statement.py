@@ -344,8 +344,7 @@ class ReducedProblem(AlgebraicProblem):
         ProblemError
             One is not: its total is not conserved there.
         """
-        known = len(self.whole.parameters)
-        states = self._states(u, p[known:])
+        states = self._states(u, p[len(self.whole.parameters) :])
         system = self.whole.discretized((), dict(zip(self.whole.parameters, map(float, p))))
         rates, matrix = system.residual(states), system.jacobian(states)
         noise = LOCATED * np.abs(matrix) @ (1 + np.abs(states))

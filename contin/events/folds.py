@@ -148,8 +148,7 @@ def passed_before(arc: Arc, fold: Event) -> list[SpecialPoint]:
 def _behind_plateau(arc: Arc, fold: Event) -> SpecialPoint:
     """Return the beginning of a step as a fold; its errors are the way since the parameter's sense was told last."""
     assert arc.state.sensed is not None
-    lengths = np.abs(free_values(arc.trial) - arc.state.sensed)
-    errors = dict(zip(arc.state.system.free, map(float, lengths)))
+    errors = dict(zip(arc.state.system.free, map(float, np.abs(free_values(arc.trial) - arc.state.sensed))))
     return SpecialPoint(0.0, fold.label, fold.name, arc.before, test=fold, errors=errors)
 
 

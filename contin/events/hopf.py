@@ -235,8 +235,7 @@ def _located(arc: Arc, left: Place, right: Place, both: tuple[complex, complex])
     test = Event(Label.HOPF, "Hopf", critical_real_part(frequency), search=hopf_points, normal_form=pair)
     if is_located and 0.0 in (first.real, last.real) and not passes(arc, at, frequency):
         return None  # the pair lies on the axis before
-    details = {"frequency": frequency, "pairs": 1}
-    return SpecialPoint(at, label, name, there, None, details, test, is_located=is_located)
+    return SpecialPoint(at, label, name, there, None, {"frequency": frequency, "pairs": 1}, test, is_located=is_located)
 
 
 def passes(arc: Arc, at: float, frequency: float) -> bool:

@@ -204,9 +204,7 @@ class Inspection:
     @functools.cached_property
     def _folds(self) -> list[SpecialPoint]:
         """Folds with respect to the primary parameter, in order."""
-        if self.fold is None:
-            return []
-        return FoldSearch(self.arc, self.fold, self._pitchfork).find()
+        return [] if self.fold is None else FoldSearch(self.arc, self.fold, self._pitchfork).find()
 
     @property
     def turns(self) -> bool:
@@ -337,8 +335,7 @@ class Inspection:
         """Return whether the trivial quantity vanishes at a point on the branch."""
         arc, name = self.arc, self.settings.trivial
         assert name is not None
-        largest = max(abs(arc.before[name]), abs(arc.trial[name]))
-        zero = max(APART * largest, round_off(point.trial, name, arc.newton))
+        zero = max(APART * max(abs(arc.before[name]), abs(arc.trial[name])), round_off(point.trial, name, arc.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
             return False
         return arc.passes_by(point.trial.x, point.at)
@@ -536,9 +533,7 @@ def _sign(test: Event) -> Entry:
         arc = inspection.arc
         if test.asks is not None:
             return test.asks(arc)
-        if test.search is not None or test.looks:
-            return True
-        return arc.passes(test)
+        return test.search is not None or bool(test.looks) or arc.passes(test)
 
     return asks
 

@@ -118,6 +118,4 @@ class Stability:
 
 def nullity_of(point: SpecialPoint) -> int:
     """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
-    if not (point.label in SINGULAR or point.is_trivial):
-        return 0
-    return finding_of(point.details).nullity
+    return 0 if not (point.label in SINGULAR or point.is_trivial) else finding_of(point.details).nullity

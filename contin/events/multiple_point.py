@@ -91,8 +91,7 @@ class MultiplePoint(Finding):
 
     def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> MultiplePoint:
         """Return the point with a kernel of the same dimension on another mesh."""
-        home = system.weights * carry(self.tangents[0])
-        return locate_multiple_point(system, carry(x), home, self.dimension, newton)
+        return locate_multiple_point(system, carry(x), system.weights * carry(self.tangents[0]), self.dimension, newton)
 
     def split(self, system: Discretization) -> Array:
         """Return by how much free parameters differ between it and the simple branch points that it may consist of."""
@@ -217,8 +216,7 @@ def locate_multiple_point(
             _, beta, G = manifold.at(s)
             slopes = manifold.second()[1]
             residual = np.append(beta, G.ravel())
-            jacobian = np.vstack([G, slopes.reshape(-1, 1 + dimension)])
-            update = np.linalg.lstsq(jacobian, residual, rcond=DOUBLED)[0]
+            update = np.linalg.lstsq(np.vstack([G, slopes.reshape(-1, 1 + dimension)]), residual, rcond=DOUBLED)[0]
             s = s - update
             if not np.isfinite(s).all() or np.max(np.abs(s)) > 1:
                 break
@@ -318,8 +316,7 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     manifold.at(s)
     second, linear = manifold.second()
     quadratic = manifold.third(second) / 2
-    random = generator("multiple point")
-    starts = random.standard_normal((_DIRECTIONS, count))
+    starts = generator("multiple point").standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
     outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)
     if max(len(outer), len(inside)) > 2 * 3**manifold.d or not all(_is_isolated(manifold, s, a) for a in inside):

@@ -72,8 +72,7 @@ def spectra_of(n: int, size: int) -> Spectra:
     """Return the room for n eigenvalues of a problem with so many unknowns."""
     return Spectra(
         np.empty((1, n, n)), np.empty((1, n)), np.empty((1, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)),
-        np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES,
-        moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
+        np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES, moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
     )  # fmt: skip
 
 
@@ -113,8 +112,7 @@ def _rate(real: Matrix, imaginary: Matrix, at: Vector, rows: IndexVector, k: int
     """Return how fast an eigenvalue moves behind a place, or behind the nearest one that has another behind it."""
     k = min(max(k, 0), rows.size - 2)
     one, other = rows[k], rows[k + 1]
-    apart = math.hypot(real[other, i] - real[one, i], imaginary[other, i] - imaginary[one, i])
-    return apart / (at[other] - at[one])
+    return math.hypot(real[other, i] - real[one, i], imaginary[other, i] - imaginary[one, i]) / (at[other] - at[one])
 
 
 @helper

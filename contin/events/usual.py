@@ -222,6 +222,4 @@ def solutions_of(system: Discretization, x: Array, column: str) -> tuple[System 
     curve: Any = system
     if not system.on_curve:
         return curve, x
-    if curve.objective == column:
-        return curve.base, x[: curve.base.size]
-    return None, x
+    return (curve.base, x[: curve.base.size]) if curve.objective == column else (None, x)

@@ -542,15 +542,9 @@ class Batch:
     """
 
     def __init__(
-        self,
-        functions: Sequence[Function],
-        counts: Sequence[int],
-        states: Sequence[str],
-        parameters: Sequence[str],
-        *,
-        ends: bool = False,
-        times: bool = True,
-    ) -> None:
+        self, functions: Sequence[Function], counts: Sequence[int], states: Sequence[str], parameters: Sequence[str], *,
+        ends: bool = False, times: bool = True,
+    ) -> None:  # fmt: skip
         self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
         self.count = sum(max(count, 1) for count in counts)
         arguments = self.signature.arguments

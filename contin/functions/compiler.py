@@ -476,8 +476,7 @@ class _Entry:
 
         int64 *shape(PyObject *given, PyObject *ndarray, int dimensions, int flags, int number)
         """
-        kind = ir.FunctionType(_WORDS, [_POINTER, _POINTER, _INT, _INT, _INT])
-        function = ir.Function(self.module, kind, "shape")
+        function = ir.Function(self.module, ir.FunctionType(_WORDS, [_POINTER, _POINTER, _INT, _INT, _INT]), "shape")
         given, array, dimensions, flags, number = function.args
         builder = ir.IRBuilder(function.append_basic_block())
         none = ir.Constant(_WORDS, None)

@@ -240,8 +240,7 @@ def _library(builder: Builder, name: str) -> tuple[Callable[..., Value], int]:
         if name != "mod":
             return found
         x, y = found, given[1]  # C's remainder has the sign of the dividend, Python's that of the divisor
-        zero = constant(double(), 0.0)
-        other = builder.fcmp_ordered("<", builder.fmul(x, y), zero)
+        other = builder.fcmp_ordered("<", builder.fmul(x, y), constant(double(), 0.0))
         return builder.select(other, builder.fadd(x, y), x)
 
     return value, count

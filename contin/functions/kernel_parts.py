@@ -136,9 +136,7 @@ def helper(*, inline: bool = False) -> Callable[[_Function], _Function]: ...
 
 def helper(function: Any = None, *, inline: bool = False) -> Any:
     """Let kernels call a function; with ``inline`` its statements are put in place of every call."""
-    if function is None:
-        return functools.partial(helper, inline=inline)
-    return Helper(function, inline)
+    return functools.partial(helper, inline=inline) if function is None else Helper(function, inline)
 
 
 _Parameters = ParamSpec("_Parameters")

@@ -156,8 +156,7 @@ def _written(error: BaseException) -> str:
             line, end, first, last = list(code.co_positions())[trace.tb_lasti // 2]
             written = linecache.getline(code.co_filename, trace.tb_lineno).strip()
             if line == end and first is not None and written:
-                whole = linecache.getline(code.co_filename, trace.tb_lineno).encode()
-                written = whole[first:last].decode()
+                written = linecache.getline(code.co_filename, trace.tb_lineno).encode()[first:last].decode()
             text = f"{written}, ".lstrip(", ") + f"line {trace.tb_lineno} of {Path(code.co_filename).name}"
         trace = trace.tb_next
     return text

@@ -120,8 +120,7 @@ class Tape:
 
     def apply(self, name: str, *operands: object, data: object = None) -> Number:
         """Append an operation, unless it can be carried out or simplified, or is there already."""
-        places = tuple(self.number(operand).place for operand in operands)
-        return Number(self, self.at(name, places, data))
+        return Number(self, self.at(name, tuple(self.number(operand).place for operand in operands), data))
 
     def at(self, name: str, places: tuple[int, ...], data: object = None) -> int:
         """Do the same with the places of the operands; return the place of the result."""

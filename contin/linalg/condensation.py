@@ -549,8 +549,7 @@ class Factorization:
     def __init__(self, layout: Layout, blocks: Blocks, whole: Share | None = None) -> None:
         self._take(layout, blocks, whole)
         factors, corners, first, last, carried, _ = self.room
-        given = layout, factors, corners, first, last, carried
-        self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
+        self.sign = math.prod(run(factorize, (layout, factors, corners, first, last, carried), self._whole, (True, False)))
 
     @classmethod
     def unfilled(cls, layout: Layout, blocks: Blocks, whole: Share | None = None) -> Factorization:

@@ -112,9 +112,7 @@ def _largest(block, rows, column):
 @helper(inline=True)
 def _ranges(step):
     """Return the end of the first and the beginning of the second range of columns that are updated; adjacent ones are one."""
-    if step.tail == step.right:
-        return step.width, step.width
-    return step.right, step.tail
+    return (step.width, step.width) if step.tail == step.right else (step.right, step.tail)
 
 
 @helper

@@ -56,8 +56,7 @@ def through(s: Array, values: Array, rates: Array, parts: int = PARTS) -> Array:
     first = np.where(np.isnan(first), 2 * chord - last, first)
     last = np.where(np.isnan(last), 2 * chord - first, last)
     first, last = (np.where(np.isnan(slope), chord, slope)[..., None] for slope in (first, last))
-    u = np.arange(parts) / parts
-    inside = hermite(values[:, :-1, None], first, last, values[:, 1:, None], u)
+    inside = hermite(values[:, :-1, None], first, last, values[:, 1:, None], np.arange(parts) / parts)
     return np.concatenate([inside.reshape(len(values), -1), values[:, -1:]], axis=1)
 
 

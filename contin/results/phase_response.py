@@ -38,8 +38,7 @@ def adjoint(system: Any, x: Array) -> Array:
     unit[system.parameter_index(PERIOD)] = 1.0
     with np.errstate(all="ignore"):
         sources = system.linearize(x)[1].solve_transposed(unit)[: count * d * n].reshape(count, d, n)
-    to_period = system.free_scales[0] / system.order
-    z = -to_period * sources / system.basis.weights[:, None]
+    z = -(system.free_scales[0] / system.order) * sources / system.basis.weights[:, None]
     turned = np.einsum("jqab,jqa->jqb", system.rates_by_states(x, system.at_gauss_points(x)).reshape(count, d, n, n), z)
     turned *= np.diff(system.mesh)[:, None, None]
     basis = system.basis

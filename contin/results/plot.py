@@ -79,8 +79,7 @@ def _draw(
         axes.plot(x[fine], y[fine], lw=1.5, color=Colour.BLUE, ls=dashes, label=once(word), zorder=1)
     style: dict[str, Any] = {"s": _DOT, "edgecolors": Colour.BLUE, "linewidths": 0.8, "zorder": 1.5}
     fill = [Colour.BLUE if full else "white" for full in filled]
-    dots = axes.scatter(across, up, c=fill, picker=True, pickradius=_NEAR, **style)
-    _tell(axes, dots, points)
+    _tell(axes, axes.scatter(across, up, c=fill, picker=True, pickradius=_NEAR, **style), points)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]

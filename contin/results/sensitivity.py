@@ -69,8 +69,7 @@ def _of_fold(point: Record, wide: System, x: Array, by: Sequence[str]) -> dict[s
     unit[system.parameter_index(primary)] = 1.0
     # F_x^T w = 0 but for the primary parameter: w from the transposed matrix bordered by that parameter's row and the tangent's
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
-    w = factors.solve_transposed(unit)[: system.equations]
-    slopes = wide.transposed_product(x, w)
+    slopes = wide.transposed_product(x, factors.solve_transposed(unit)[: system.equations])
     sizes = dict(zip(wide.free, wide.free_scales))
     at = {name: slopes[wide.parameter_index(name)] / sizes[name] for name in (primary, *by)}
     return {name: {primary: float(-at[name] / at[primary])} for name in by}

@@ -41,8 +41,7 @@ _MOST_ROUNDS = 16
 @checks.arguments
 def cycle(
     problem: CycleProblem, start: Sequence[float], parameters: Mapping[str, float] | None = None, *, settle: float = 100.0,
-    intervals: int = 40,
-    degree: int | None = None,
+    intervals: int = 40, degree: int | None = None,
 ) -> Point:  # fmt: skip
     """Return the stable cycle that a time integration from ``start`` settles on.
 
@@ -104,8 +103,7 @@ Field = Callable[[float, Array], Any]
 def _vector_field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
     """Return the field as an integrator of SciPy calls it."""
     of_state = named_values(problem.state_names)
-    of_parameters = named_values(tuple(values))
-    p, field = of_parameters(**values), problem.field
+    p, field = named_values(tuple(values))(**values), problem.field
     if problem.period is None:
         return lambda t, u: field(of_state(*u), p)
     return lambda t, u: field(t, of_state(*u), p)

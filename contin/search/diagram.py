@@ -203,8 +203,7 @@ class _Explorer:
     def run(self, system: Discretization, x: Array, depth: int) -> Diagram:
         """Follow both ways from the start, unless the branch is closed, then leave every junction of less than ``depth``."""
         for direction in (1, -1):
-            settings = dataclasses.replace(self.settings, direction=direction)
-            self._follow(self._run(system, x, settings), 0)
+            self._follow(self._run(system, x, dataclasses.replace(self.settings, direction=direction)), 0)
             stop = self.result.branches[-1].stop
             if stop is not None and stop.reason == Reason.CLOSED:
                 break
@@ -243,8 +242,7 @@ class _Explorer:
         elsewhere = [point for points in reached for point in points if any(other.holds(point) for other in beside)]
         if not elsewhere and not site.known:
             elsewhere = [min(points, key=site.distance) for points in reached]
-        follow = functools.partial(self._follow_found, site, start, depth)
-        return site.search(elsewhere, follow)
+        return site.search(elsewhere, functools.partial(self._follow_found, site, start, depth))
 
     def _follow_found(self, site: Site, start: Point, depth: int, point: Point, account: Searched) -> None:
         """Follow a solution that a search has found both ways, and what leaves there."""

@@ -337,8 +337,7 @@ def _values(
     own = {}
     if isinstance(problem, CycleProblem):
         own = {ROUNDS: 1.0} if problem.period is not None else {PERIOD: solution.parameters.get(_PERIOD, 0.0)}
-        gained = solution.states[-1] - problem.symmetry @ solution.states[0]
-        own |= windings(problem.angles, problem.state_names, gained)
+        own |= windings(problem.angles, problem.state_names, solution.states[-1] - problem.symmetry @ solution.states[0])
     known = {**own, **solution.parameters, **given}
     for name in problem.parameters:
         if name not in known:
@@ -358,8 +357,7 @@ def _system(
     degree, (a, b) = solution.degree, problem.domain
     if not degree:
         raise ProblemError("solution: is an equilibrium; state the problem as an AlgebraicProblem")
-    mesh = a + (b - a) * solution.t[::degree]
-    system = problem.discretized(free, values, None, mesh, degree)
+    system = problem.discretized(free, values, None, a + (b - a) * solution.t[::degree], degree)
     x = system.pack(_at_nodes(solution), values)
     return system.with_reference(x), x
 

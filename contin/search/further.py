@@ -305,8 +305,7 @@ class Site:
         while waiting := [point for point in (*bases, *self.known) if not any(point is base for base in self._bases)]:
             self._bases.append(waiting[0])
             system, x = self.held(waiting[0])
-            states = np.arange(x.size) < system.state_size
-            yield "reversed", system, np.where(states, -x, x)
+            yield "reversed", system, np.where(np.arange(x.size) < system.state_size, -x, x)
             for each in search.maps:
                 yield "mapped", system, _fitted(system, _mapped(system, each, x))
             for size in search.sizes:

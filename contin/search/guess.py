@@ -36,8 +36,7 @@ def with_guessed_multipliers(system: Collocation, states: Array) -> Array:
     """
     if system.intervals > _MOST_INTERVALS:
         a, b = system.problem.domain
-        mesh = np.linspace(a, b, _MOST_INTERVALS + 1)
-        coarse, _ = system.on_mesh(mesh)
+        coarse, _ = system.on_mesh(np.linspace(a, b, _MOST_INTERVALS + 1))
         sampled = np.stack([np.interp(coarse.nodes, system.nodes, column) for column in states.T], axis=1)
         fitted = _fitted(coarse, sampled)
         return _packed(
@@ -185,8 +184,7 @@ def _over_own_time(problem: Any, guess: Guess, parameters: dict[str, float]) -> 
     if t.size < 2 or states.size != t.size * len(problem.state_names):
         return guess, parameters  # said of the guess as it is
     begin, time = t[0], t[-1] - t[0]
-    ends = states.reshape(t.size, -1)[[0, -1]].ravel().tolist()
-    found = dict(zip(problem.ends, ends))
+    found = dict(zip(problem.ends, states.reshape(t.size, -1)[[0, -1]].ravel().tolist()))
     if abs(begin) <= LOCATED and abs(time - 1) <= LOCATED:
         return guess, {**found, **parameters}
     if problem.own_time:
@@ -287,8 +285,7 @@ def _without_mesh(problem: AlgebraicProblem, guess: Guess, options: Options) -> 
     states = np.zeros(count) if given is None else _numbers(given)
     if states.size != count:
         states = _numbers(given, system.state_size)
-    x = system.pack(states, {**problem.parameters, **options.parameters})
-    return system.with_rounds_of(x, options.parameters)
+    return system.with_rounds_of(system.pack(states, {**problem.parameters, **options.parameters}), options.parameters)
 
 
 def _on_mesh(problem: BoundaryValueProblem, guess: Guess, options: Options) -> tuple[System, Array]:

@@ -124,8 +124,7 @@ class _Saddle:
         rest = nearest_zero(lambda u: (system.residual(u), system.jacobian(u)), guess)
         if rest is None:
             raise ConvergenceError(f"the equilibrium is not found at {self.name} = {value:.6g}")
-        matrix = self.sense * system.jacobian(rest)
-        found, vectors = np.linalg.eig(matrix)
+        found, vectors = np.linalg.eig(self.sense * system.jacobian(rest))
         at = int(np.argmax(found.real))
         right = oriented(vectors[:, at].real)
         left = np.linalg.inv(vectors)[at].real
@@ -344,8 +343,7 @@ def _from_saddle(
     values |= dict(zip(problem.multipliers, rest))
     times = orbit.times / orbit.times[-1]
     degree = usual_degree(len(states), options[0].tolerance)
-    every = max(1, len(times) // INTERVALS)
-    points = np.append(times[:-1:every], 1.0)
+    points = np.append(times[: -1 : max(1, len(times) // INTERVALS)], 1.0)
     started = ConnectionCollocation(problem, points, degree, names, values)
     x = started.pack(np.stack([np.interp(started.nodes, times, column) for column in orbit.states.T], axis=1), values)
     return solved(started.with_reference(x), x, *options)

@@ -213,9 +213,7 @@ def leaving(start: Point, kind: str, branch: int) -> First:
         return _hopf_points(base, x, frequencies[-1] if frequencies else 0.0)
     if start.label == Label.GENERALIZED_HOPF:
         return _corrected_cycle(base, x, frequencies[0], None)
-    if kind == Label.TORUS:
-        return _tori(base, x, frequencies, branch)
-    return FoldCurve(base), x, None
+    return _tori(base, x, frequencies, branch) if kind == Label.TORUS else (FoldCurve(base), x, None)
 
 
 def _equilibrium(start: Point) -> tuple[Algebraic, Array]:
@@ -251,8 +249,7 @@ def _tori(base: Algebraic, x: Array, frequencies: list[float], branch: int) -> F
     """Return the curve of torus bifurcations of the cycles of one pair."""
     if not 0 <= branch < len(frequencies):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(frequencies) - 1}")
-    other = frequencies[1 - branch] if len(frequencies) > 1 else 0.0
-    return _corrected_cycle(base, x, frequencies[branch], other)
+    return _corrected_cycle(base, x, frequencies[branch], frequencies[1 - branch] if len(frequencies) > 1 else 0.0)
 
 
 def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float | None) -> First:
@@ -294,9 +291,7 @@ def _corrected(system: Discretization, x: Array, tangent: Array, size: float) ->
     except ConvergenceError:
         return None
     off = system.weights @ (found - x) ** 2
-    if not off < (_OFF * size) ** 2:
-        return None
-    return system, found, linearization(system, found, row).tangent
+    return (system, found, linearization(system, found, row).tangent) if off < (_OFF * size) ** 2 else None
 
 
 def _homoclinic(base: Algebraic, x: Array) -> First:
