@@ -256,6 +256,7 @@ class OpenStrip:
         if degree is None and not isinstance(guess, Point):
             degree = 6
         options = {"intervals": intervals, "degree": degree, **options}
+        self._check_phases(values or {})
         try:
             point = solve(self.problem, guess, values, **options)
         except ContinError as error:
@@ -275,6 +276,23 @@ class OpenStrip:
         except ProblemError as error:
             raise ProblemError(self._law_at(guess) or self._with_phases(str(error), guess, values, options)) from error
         return point
+
+    def _check_phases(self, values: Mapping[str, float]) -> None:
+        """Raise ProblemError for more phases than symmetries of a strip whose first end is clamped.
+
+        An isotropic section turns about the tangent without a change of H, and a closed uniform strip shifts along itself. Both
+        may end with loads or by the last end: then the phases have multipliers.
+        """
+        if not self.phases or self.start.rotation != CLAMPED or len(self.start.held) < 3:
+            return
+        p, law = SimpleNamespace(**{**self.parameters, **values}), self.section.hamiltonian()
+        turned = [law(0.5, 0.1 * math.cos(a), 0.1 * math.sin(a), 0.05, p) for a in (0.3, 1.2, 2.6, 4.4)]
+        closed = all(abs(getattr(p, name, math.inf)) < LOOSE for name in PLACE)
+        known = ["a turn about the tangent"] * bool(np.ptp(turned) <= LOOSE * np.abs(turned).max())
+        known += ["a shift along the strip"] * (closed and self.section.homogeneous)
+        if len(self.phases) > len(known):
+            has = f"{known[0]} only; leave one" if known else "none; leave phases"
+            raise ProblemError(f"phases: {[*self.phases]}: each holds a continuous symmetry, and the strip has {has} out")
 
     def _with_phases(self, reason: str, guess, values: Mapping[str, float] | None, options: Mapping) -> str:
         """Return the reason why nothing determines the state, with the phases that do, as few as possible: all are tried."""

@@ -90,6 +90,18 @@ def test_branch_points_that_a_phase_makes(load):
     assert made == branch.notes and f"{load} = {'-10.986' if sign < 0 else '49.900'}" in made[0]
 
 
+@pytest.mark.parametrize(("numbers", "phases", "has"), [
+    ({"B2": 4.0}, ["spin"], "none; leave phases out"), ({"B2": 1.0, "kappa_n": 1.0}, ["spin"], "none; leave phases out"),
+    ({"B2": 1.0}, ["spin", "shift, right"], "a turn about the tangent only; leave one out"),
+])  # fmt: skip
+def test_phases_beyond_the_symmetries(numbers, phases, has):
+    """A clamped column does not shift, and turns about its tangent if it bends alike in all planes: 1/B1 = 1/B2, straight."""
+    column = OpenStrip(section_of("rod", {"B1": 1.0, "C": 0.8, **numbers}), finish=FREE_END, phases=tuple(phases))
+    with pytest.raises(ProblemError) as error:
+        column.first_point()
+    assert str(error.value) == f"phases: {phases}: each holds a continuous symmetry, and the strip has {has}"
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("stiffness", "turn"), [(1.0, 14.5), (3.0, math.pi)], ids=["a ring that spins", "a band that shifts"])
 def test_the_phases_that_a_message_recommends_are_no_loads(stiffness, turn):
