@@ -37,7 +37,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability, nullity_of
-from contin.levels import DEPENDENT, LOCATED, ROUGH
+from contin.levels import DEPENDENT, LOCATED, ROUGH, ROUND_OFF
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -447,7 +447,8 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Arr
         begin += count
     q += both.T @ second @ both
     rows = np.vstack([ends @ both, held])
-    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = np.where(sizes > ROUND_OFF, rows, 0.0) / np.maximum(sizes, ROUND_OFF)  # without a slope: round-off is none
     free = np.eye(size)
     if len(rows):
         _, singular, vectors = np.linalg.svd(rows)
