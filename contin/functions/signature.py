@@ -75,6 +75,9 @@ class UserFunction:
         self.fills = argument_count(function) == len(arguments) + 1
         self._arrays = len(arguments) if self.fills else len(arguments) - 1 if takes_arrays(function, arguments) else 0
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name})"
+
     @property
     def name(self) -> str:
         """How messages name it."""

@@ -166,15 +166,15 @@ def _update(system: System, x: Array) -> Array:
     return factors.solve(residual)
 
 
-def _noise(system: System, x: Array) -> float:
-    """Return by how much the residual changes where x changes by one unit in the last place."""
+def _noise(system: System, x: Array) -> Array:
+    """Return by how much each residual changes where x changes by one unit in the last place."""
     random, residual = draws.generator("failure of solve"), system.residual(x)
-    return max(float(np.abs(system.residual(draws.rounded(random, x)) - residual).max()) for _ in range(draws.DRAWS))
+    return np.max([np.abs(system.residual(draws.rounded(random, x)) - residual) for _ in range(draws.DRAWS)], axis=0)
 
 
 def _is_solution(system: System, z: Array, guess: Array) -> bool:
     """Return whether the residual at z is round-off: of z, or of what it was at the guess."""
-    level = UNITS * _noise(system, z)
+    level = UNITS * float(_noise(system, z).max())
     if system.intervals:  # what acts along t is rounded, too
         level += LAST_PLACES * float(np.abs(system.residual(guess)).max())
     return bool(np.isfinite(level) and np.abs(system.residual(z)).max() <= level)
@@ -183,22 +183,25 @@ def _is_solution(system: System, z: Array, guess: Array) -> bool:
 def _singular_error(system: System, x: Array) -> float | None:
     """Return how far round-off of F lets a solution be off where F_x is singular beside it, relative to 1 + |x|; else None.
 
-    Along the null vector F is round-off up to that distance. Beyond it F grows with a power of it: fast if F_x is singular,
-    with the first power only where it is regular. Where F stays round-off, solutions form a curve.
+    Along the null vector w.F is round-off up to that distance, w the left one: other equations have round-off of their own.
+    Beyond it w.F grows with a power of it: fast if F_x is singular, with the first power only where it is regular. Where it
+    stays round-off, solutions form a curve.
     """
     rank = _rank(system, x)
     if rank is None or _are_many(system, x, rank):
         return None
     v, any_way = (d / np.max(np.abs(d) / (1 + np.abs(x))) for d in (rank.right[-1], random_rows(1, x.size)[0]))
 
-    def size(step: Array) -> float:
-        return min(float(np.abs(system.residual(x + sign * step)).max()) for sign in (1, -1))
+    def size(step: Array, along: bool = True) -> float:
+        values = [system.residual(x + sign * step) for sign in (1, -1)]
+        return min(float(np.abs(rank.left[-1] @ each if along else each).max()) for each in values)
 
     with np.errstate(all="ignore"):
         places = 0.5 ** np.arange(52, 6, -1)
-        sizes, usual = (np.array([size(s * d) for s in places]) for d in (v, any_way))
+        sizes, usual = np.array([(size(s * v), size(s * any_way, False)) for s in places]).T
         positive = sizes[sizes > 0]
-        level = CERTAIN * max(_noise(system, x), float(np.abs(system.residual(x)).max()), positive[0] if positive.size else 0.0)
+        noise = float(np.abs(rank.left[-1]) @ np.maximum(_noise(system, x), np.abs(system.residual(x))))
+        level = CERTAIN * max(noise, positive[0] if positive.size else 0.0)
         above = np.flatnonzero((sizes > level) & (sizes > CORRECTED * usual))
         s = float(places[above[0]]) if above.size else 1.0
         return s if s < ROUGH and size(4 * s * v) > 8 * size(s * v) else None
