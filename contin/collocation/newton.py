@@ -1,4 +1,6 @@
-"""Newton's method on a mesh in one call of a kernel, which decides as `contin.core.newton` does, and the arrays it works in.
+"""Newton's method on a mesh in one call of a kernel, and the arrays in which it works.
+
+Newton's method on a mesh in one call of a kernel, which decides as `contin.core.newton` does.
 
 It serves functions that are recorded, meshes of one segment, and linear conditions besides. What it cannot decide by itself,
 whether updates that no longer shrink are round-off, is left to Python.
@@ -219,7 +221,7 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
 @helper
 def _iterate(codes, mesh, room, matrix, x, control, report):
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
-    before, size, moved, fresh, chord, tolerance = math.inf, math.inf, 1.0, True, False, control.tolerance
+    before, size, moved, fresh, tolerance = math.inf, math.inf, 1.0, True, control.tolerance
     for number in range(control.most):
         if not _evaluate(codes, mesh, room, x, fresh):
             return STAGNATES
@@ -238,9 +240,9 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
             return RIGHT if fresh and size <= RIGHT_THERE else CONVERGED
         if stagnates(size, rate, number + 1):
             return STAGNATES
-        if number > 1 and diverges(size, before, fresh and chord):
+        if number > 1 and diverges(size, before):
             return FAILED
-        chord, fresh = not fresh, wants_jacobian(size, rate, tolerance)
+        fresh = wants_jacobian(size, rate, tolerance)
     return FAILED
 
 

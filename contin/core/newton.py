@@ -367,12 +367,10 @@ class _Progress:
         self.sizes: list[float] = []
         self._moved = 1.0  # distance from where the Jacobian was taken
         self.rate = 1.0  # estimated ratio of the error after the last update to its size
-        self._chord = self._renewed = False  # the last update is a chord step; it is none, but the one before was
 
     def record(self, size: float, fresh: bool) -> None:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
-        self._renewed, self._chord = fresh and self._chord, not fresh
         self._moved = size if fresh else self._moved + size
         before = self.sizes[-2] if len(self.sizes) > 1 else math.inf
         self.rate = estimated_rate(size, before, self._moved, fresh)
@@ -394,8 +392,8 @@ class _Progress:
 
     @property
     def diverges(self) -> bool:
-        """The last update is more than twice the one before, with a Jacobian as new."""
-        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2], self._renewed)
+        """The last update is more than twice the one before."""
+        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2])
 
     @property
     def wants_jacobian(self) -> bool:

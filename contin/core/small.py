@@ -182,7 +182,7 @@ def linearize(equations: Equations, linear: Linear, x: Array) -> float:
 @helper
 def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float) -> int:
     """Solve F(x) = 0 and row.x = target by Newton's method and chord steps, in place."""
-    size, fresh, chord, moved, before, now = x.size, True, False, 1.0, math.inf, math.inf
+    size, fresh, moved, before, now = x.size, True, 1.0, math.inf, math.inf
     for number in range(1, most + 1):
         now = math.inf
         if not fresh:
@@ -205,9 +205,9 @@ def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, 
             return BELIEVED
         if stagnates(now, rate, number):
             return ASKS
-        if number > 2 and diverges(now, before, fresh and chord):
+        if number > 2 and diverges(now, before):
             break
-        chord, fresh, before = not fresh, wants_jacobian(now, rate, tolerance), now
+        fresh, before = wants_jacobian(now, rate, tolerance), now
     return ASKS if now <= STAGNANT else FAILED
 
 

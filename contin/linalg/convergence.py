@@ -44,12 +44,9 @@ def stagnates(size: float, rate: float, updates: int) -> bool:
 
 
 @helper
-def diverges(size: float, before: float, renewed: bool) -> bool:
-    """Return whether an update is more than twice the one before, and the Jacobian is not ``renewed`` after chord steps.
-
-    Near a branch point one that is slightly off makes updates far too small: the first with a new one is larger, and right.
-    """
-    return size > 2 * before > LOCATED and not renewed
+def diverges(size: float, before: float) -> bool:
+    """Return whether an update is more than twice the one before."""
+    return size > 2 * before > LOCATED
 
 
 @helper

@@ -158,13 +158,3 @@ def test_transposed_product_is_that_of_the_linearization():
     h = 1e-4
     slope = (system.residual(x + h * v) - system.residual(x - h * v)) / (2 * h)
     assert system.transposed_product(x, w) @ v == pytest.approx(w @ slope, abs=1e-6)
-
-
-def test_a_larger_update_with_a_new_jacobian_is_no_divergence():
-    """Close to a branch point at d = 0, as the test of that name of ``correct`` has it, for constants on a mesh."""
-    problem = BoundaryValueProblem(
-        lambda t, u, p: (0 * u.x, 0 * u.y), lambda a, b, p: ((p.d + 1e3 * a.y) * a.x, a.y + a.y**2), ["x", "y"], {"d": 1e-2}
-    )
-    system = Collocation(problem, np.linspace(0, 1, 4), 3, [], {"d": 1e-2})
-    done = correct(system, np.tile([1e-4, 0.02], system.size // 2))
-    assert np.abs(done.x).max() < 1e-12 and done.error < 1e-12

@@ -205,17 +205,3 @@ def test_small_updates_that_solve_nothing_are_no_round_off(square, guess):
     nothing = Algebraic(AlgebraicProblem(lambda u, p: (u.x**2 + square,), ["x"], {"a": 0.0}), [])
     with pytest.raises(ConvergenceError):
         correct(nothing, [guess])
-
-
-@pytest.mark.parametrize("off", [1e-4, 1e-6])
-@pytest.mark.parametrize("recorded", [True, False])
-def test_a_larger_update_with_a_new_jacobian_is_no_divergence(off, recorded):
-    """A branch point is near, at d = 0. While y is not zero the Jacobian is too steep, and updates of x are far too small.
-
-    The first one that is made right at y = 0 is hundreds of times larger than the chord steps before. The solution is (0, 0).
-    """
-    d = 1e-2
-    problem = AlgebraicProblem(lambda u, p: ((p.d + 1e3 * u.y) * u.x, u.y + u.y**2), ["x", "y"], {"d": d})
-    equations = Equations(lambda x, y: [(d + 1e3 * y) * x, y + y * y], lambda x, y: [[d + 1e3 * y, 1e3 * x], [0, 1 + 2 * y]])
-    done = correct(Algebraic(problem, []) if recorded else equations, [off, 0.02])
-    assert np.abs(done.x).max() < 1e-12 and done.error < 1e-12
