@@ -174,7 +174,7 @@ QUICK = ("network_weight",)
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in NAMES]
+    "name", [name if name in QUICK else pytest.param(name, marks=[pytest.mark.full, pytest.mark.hours]) for name in NAMES]
 )  # fmt: skip
 @pytest.mark.parametrize("change", [one if one == "all" else pytest.param(one, marks=pytest.mark.full) for one in CHANGES])
 def test_shipped_networks_are_the_same_however_they_are_drawn(name, change, tmp_path):
