@@ -154,7 +154,8 @@ def _summed(system: System, x: Array) -> Array:
             if size >= np.abs(before).max():
                 break
             if _FACTORS[0] < factor < _FACTORS[1] and abs(factor - last) < _STEADY:
-                update, factor, size = update / (1 - factor), 0.0, 0.0
+                # a little less: round-off would choose between two roots that are close to each other
+                update, factor, size = (1 - APART) * update / (1 - factor), 0.0, 0.0
         x, before = x - update, update if size else None
         if np.all(np.abs(update) <= np.finfo(float).eps * np.abs(x)):
             break
