@@ -38,7 +38,7 @@ from contin import (
     VariationalSegment,
     solve,
     trace,
-)  # fmt: skip
+)
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
@@ -56,7 +56,7 @@ from ribbon_model.members import (
     Quaternion,
     numbers_of,
     straight,
-)  # fmt: skip
+)
 from ribbon_model.outlines import fans
 from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section

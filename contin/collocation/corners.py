@@ -3,8 +3,7 @@
 Where recorded functions have jumps and corners: conditions, and what the functions would be with their other outcome.
 
 A condition on time alone (``t < 0.4``, ``max(0, t - 1)``, a table of time) switches at known times. A condition on states or on
-free parameters (``u.x > 0.3``, ``abs(u.x)``) is a selection: it switches where the solution goes. `contin.collocation.corners`
-finds the places of both.
+free parameters (``u.x > 0.3``, ``abs(u.x)``) is a selection: it switches where the solution goes.
 
 Corners and jumps that a solution decides, as ``max(0, u.x)`` does: where they are on it, and what they cost on its mesh.
 

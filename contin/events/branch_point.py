@@ -15,7 +15,7 @@ coordinates s. The branch point is where the gradient vanishes, and the Hessian 
 
 Branch points: located through their own regular equations, with the tangents of all branches that meet there.
 
-Newton's method for F + beta psi = 0 together with grad beta = 0 (`contin.events.branch_point`): linearize with the borders; one
+Newton's method for F + beta psi = 0 together with grad beta = 0: linearize with the borders; one
 update solves the first equations, one along the kernel, by the Hessian, brings the gradient to zero. Between new Hessians
 the change of the gradient updates it (Broyden's rule).
 """

@@ -239,8 +239,8 @@ class FoldSearch:
         The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
         round-off, or the equations so nearly singular that Newton's method stays above its tolerance, and the parameter itself
         does not differ from one fold to the next, or to both ends of the step, there is none. A fold where it does not differ
-        from a first point on which branches cross is that point. For rates that may be errors of the mesh see
-        `contin.events.folds`.
+        from a first point on which branches cross is that point. Rates that may be errors of
+        the mesh are compared with those on a finer one.
         """
         arc = self.arc
         left, right = (arc.low, arc.before), (arc.step, arc.trial)

@@ -15,7 +15,7 @@ folds; the folds; the end of a closed branch. What was located is sorted by its 
 The watch list of a run: what both ends of a step say of special points inside it, and of whether it stays on its branch.
 
 It is made when a run begins. Each entry compares numbers of both ends, and asks for a closer look at the step
-(`contin.events.inspection`) where something may happen in between. A step for which no entry asks is plain: nothing else is
+where something may happen in between. A step for which no entry asks is plain: nothing else is
 computed of it.
 """
 

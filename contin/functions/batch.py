@@ -7,9 +7,8 @@ estimated error.
 
 A user's functions evaluated at many points in one call, with exact derivatives.
 
-The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter
-(`contin.functions.batch`). What cannot be recorded is evaluated in Python (`contin.functions.batch`), with a
-warning. Both answer the same `Request`.
+The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter.
+What cannot be recorded is evaluated in Python, with a warning. Both answer the same `Request`.
 """
 
 from __future__ import annotations

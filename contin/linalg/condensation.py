@@ -16,7 +16,7 @@ The matrix is drawn in `contin.linalg.blocks.Blocks`. It is eliminated in three 
 A matrix that is not large is one segment (`contin.linalg.blocks`): the rest has the first and the last mesh point.
 
 This is the scheme of de Boor & Weiss (1980) in the order that AUTO uses. It takes N (n d)^3 operations and N (n d)^2 numbers;
-solves with the matrix and with its transpose only substitute, in `contin.linalg.condensation`.
+solves with the matrix and with its transpose only substitute.
 """
 
 from __future__ import annotations
