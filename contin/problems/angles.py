@@ -121,5 +121,5 @@ def check_periodic(
                     of_state = f"that of {names[value]}" if gap.shape[1] == len(names) else f"number {value + 1}"
                     raise ProblemError(
                         f"angles: the {what} is not periodic in {name}; of its values, {of_state} changes by "
-                        f"{gap[place, value]:.3g} from {name} = {u[place, names.index(name)]:.3g} to {name} + {period:.6g}"
+                        f"{abs(gap[place, value]):.3g} from {name} = {u[place, names.index(name)]:.3g} to {name} + {period:.6g}"
                     )
