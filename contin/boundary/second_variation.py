@@ -55,11 +55,14 @@ class SecondVariation:
     ----------
     eigenvalues : ndarray
         Of the reduced matrix, ascending, without positive ones that were eliminated. Their signs matter, and where they vanish.
+    known : float
+        Error of the state, relative to 1 + |x|.
     """
 
     eigenvalues: Array
     _vectors: Array
     _parts: tuple[_Part, ...]
+    known: float = 0.0
 
     def __repr__(self) -> str:
         return f"SecondVariation({len(self.eigenvalues)} eigenvalues, {self.index()} of them negative)"
@@ -68,7 +71,7 @@ class SecondVariation:
     def is_determined(self) -> bool:
         """Whether no eigenvalue is zero, as far as the state is known: nothing moves without a change of energy."""
         sizes = np.abs(self.eigenvalues)
-        return not sizes.size or bool(sizes.min() > LOCATED * sizes.max())
+        return not sizes.size or bool(sizes.min() > max(LOCATED, self.known) * sizes.max())
 
     def index(self, nullity: int = 0) -> int:
         """Return the number of negative eigenvalues, without the ``nullity`` ones that are nearest to zero."""

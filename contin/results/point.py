@@ -421,7 +421,7 @@ class Point(Record):
         found = second_variation(self.system, self.x)  # type: ignore[arg-type]
         if found is None:
             raise ProblemError("second_variation: the energy is not convex in the controls there (Legendre's condition)")
-        return found
+        return dataclasses.replace(found, known=self.newton_error)
 
 
 def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
