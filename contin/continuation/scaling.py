@@ -35,7 +35,7 @@ from contin.core.settings import Settings
 from contin.core.system import USUAL, System, usual
 from contin.core.trial import Linearization, Trial
 from contin.events.folds import on_finer_mesh
-from contin.levels import APART, CORRECTED, DOUBLED, ROUGH
+from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
@@ -125,11 +125,14 @@ class _FirstPoint:
         self._others: list[tuple[Array, Any, float]] = []
 
     def _stands_still(self, rate: float) -> bool:
-        """Return whether the primary parameter stands still while states go on: by itself, and relative to all values."""
+        """Return whether the primary parameter stands still while states go on: by itself, and relative to all values.
+
+        At a fold it does so as far as the fold is located.
+        """
         x, tangent = np.abs(self.x), np.abs(self.linear.tangent)
         value, moving = x[self.place], (x > 0) & (tangent > 0)
-        slow = abs(rate) * x[moving] <= CORRECTED * value * tangent[moving]  # no quotients: zeros may have become 1e-300
-        return bool(abs(rate) <= CORRECTED and (rate == 0 or (value > 0 and slow.any())))
+        slow = abs(rate) * x[moving] <= LOCATED * value * tangent[moving]  # no quotients: zeros may have become 1e-300
+        return bool(abs(rate) <= LOCATED and (rate == 0 or (value > 0 and slow.any())))
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:

@@ -1,7 +1,7 @@
 """The whole error of a number that is computed from a solution: of the mesh, of Newton's method, and of the place.
 
-1. The mesh: the solution is found again on the mesh with every interval halved, and the number computed there, too. Branch
-   points and folds are found as such, any other point where the first free parameter has its value.
+1. The mesh: the solution is found again on the mesh with every interval halved, or as it is without one, and the number
+   computed there, too. Branch points and folds are found as such, any other point where the first free parameter has its value.
 2. Newton's method and round-off: what the last update left, relative to 1 + the number.
 3. The place: a special point is known up to the errors of its free parameters. The number changes over that distance along the
    branch. At folds and branch points step 1 has found the place again.
@@ -98,17 +98,14 @@ def error(point: Solution, functional: Functional, apart: Apart = lambda a, b: n
 
 
 def _of_mesh(point: Solution, functional: Functional, here: Array, apart: Apart) -> Any:
-    """Return what halving the mesh changes.
+    """Return what halving the mesh changes or, without one, finding the point once more.
 
     Raises
     ------
     ConvergenceError
         The point is not found there.
     """
-    finer = point.system.refined()
-    if finer is None:
-        return 0.0
-    system, carry = finer
+    system, carry = point.system.refined() or (point.system, np.array)
     return _FINER * apart(np.asarray(functional(Trial.without_tangent(system, _again(point, system, carry)))), here)
 
 
@@ -118,7 +115,7 @@ def _again(point: Solution, system: Discretization, carry: Carrier) -> Array:
     if known.has_equations:
         there: Trial = known.again(system, carry, point.x, Newton()).there(system, carry(point.tangent))
         return there.x
-    if point.label == Label.FOLD and point.column in system.free and np.isfinite(point.tangent).all():
+    if _is_fold(point):
         return zero_again(system, x, carry(point.tangent), fold(point.column), Newton())[0].x
     if system.size == system.equations:
         return correct(system, x).x
@@ -127,11 +124,16 @@ def _again(point: Solution, system: Discretization, carry: Carrier) -> Array:
     return correct(system, x, row, row @ x).x
 
 
+def _is_fold(point: Solution) -> bool:
+    """Return whether a point is found again as a fold of a free parameter."""
+    return point.label == Label.FOLD and point.column in point.system.free and bool(np.isfinite(point.tangent).all())
+
+
 def _of_place(point: Solution, functional: Functional, here: Array, apart: Apart) -> Any:
     """Return what the numbers change over the distance that the place of a special point is known to."""
     system, name = point.system, next(iter(point.system.free), "")
     located = point.errors.get(name, 0.0)
-    if not located or point.label in (Label.FOLD, Label.BRANCH_POINT) or not np.isfinite(point.tangent).all():
+    if not located or finding_of(point.details).has_equations or _is_fold(point) or not np.isfinite(point.tangent).all():
         return 0.0
     beside = Trial.without_tangent(system, point.x + ASIDE * point.tangent)
     moved = abs(beside[name] - Trial.without_tangent(system, point.x)[name])
