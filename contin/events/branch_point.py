@@ -111,13 +111,13 @@ class BorderedMatrix:
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
-    """Return borders made of null vectors at x: those that random borders give, improved once, or rows about the ``kernel``.
+    """Return borders made of null vectors at x: those that random ones give, or rows about the ``kernel``, improved once.
 
     Where x is not at a branch point, the second null vector depends on the borders: random ones may be nearly normal to it.
     """
     random = generator("bordered")
     rows, left = kernel, random.standard_normal(system.equations) / np.sqrt(system.equations)
-    for _ in range(2 if kernel is None else 1):
+    for _ in range(2):
         rows = random.standard_normal((2, system.size)) if rows is None else rows
         matrix = BorderedMatrix(system, x, orthonormal(rows, system.weights), left)
         if not np.isfinite(matrix.kernel).all():
