@@ -8,7 +8,7 @@ from .core.labels import Label
 from .core.newton import correct
 from .core.step import State, Stop
 from .core.trial import Trial
-from .equilibria.branches import Algebraic
+from .equilibria.equations import Algebraic
 from .events.branch_point import BranchPoint, locate_branch_point
 from .events.error import error
 from .events.multiple_point import MultiplePoint

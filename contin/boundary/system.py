@@ -1,20 +1,14 @@
 """Boundary value problems on a mesh: unknowns, equations, conditions, and what is known of their branches.
 
-The unknowns of a problem on a mesh: piecewise polynomials, the places where they are taken, and other meshes.
-
-On each of N intervals the solution is a polynomial of degree d through d + 1 Lobatto nodes, the end nodes shared.
-
-Orthogonal collocation at Gauss points on a mesh: the discrete equations, their Jacobian and higher derivatives.
-
-The polynomials satisfy the equation at the d Gauss points of each interval: error O(h^(2 d)) at the mesh points
-(superconvergence, de Boor & Swartz 1973). Integrals use the same Gauss points, so they converge as fast.
+On each of N intervals the solution is a polynomial of degree d through d + 1 Lobatto nodes, the end nodes shared. It satisfies
+the equation at the d Gauss points of each interval: error O(h^(2 d)) at the mesh points (superconvergence, de Boor & Swartz
+1973). Integrals use the same Gauss points, so they converge as fast.
 """
 
 from __future__ import annotations
 
 import functools
 import threading
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -44,8 +38,39 @@ from contin.problems.statement import Statement
 _ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies", "_spectra_found")
 
 
-class OnMesh(System):
-    """Unknowns on a mesh, and the free parameters behind them.
+#: Times, states, states at the other end and parameters at which functions are evaluated.
+_At = tuple[Array, Array, Array, Array]
+#: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
+#: than by one kernel, three the same, ten a twentieth of the time.
+_APART = 30
+#: The t of boundary conditions, which do not take it.
+_TIME = np.zeros(1)
+
+
+@functools.cache
+def _NONE(n: int) -> Array:
+    """Return the absent second state of a function of one point."""
+    return np.empty((0, n))
+
+
+class Collocation(System):
+    """A problem discretized on a mesh: what the continuation loop works on.
+
+    A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,
+    then the free parameters. A residual, shape (size - 1,) on a curve, holds collocation (scaled by h), boundary and
+    integral conditions.
+
+    Parameters
+    ----------
+    problem : BoundaryValueProblem
+    mesh : ndarray, shape (N + 1,)
+        Mesh points, increasing, from one end of the domain to the other.
+    degree : int
+        Polynomial degree d, 2 to 8 (AUTO's NCOL; N is its NTST).
+    free : sequence of str
+        The free parameters.
+    parameters : mapping of str to float
+        Values of all parameters; those of the free ones are ignored.
 
     Attributes
     ----------
@@ -53,10 +78,25 @@ class OnMesh(System):
         Mesh points and nodes.
     gauss_times, gauss_weights : ndarray, shape (N d,)
         Gauss points and weights of their quadrature.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter, a bad mesh or degree.
+
+    Examples
+    --------
+    >>> from contin import BoundaryValueProblem
+    >>> heat = BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
+    >>> system = Collocation(heat, [0.0, 0.5, 1.0], 4, ["q"], {})
+    >>> system.size, system.nodes.tolist()[::4]  # two states at nine nodes, and q
+    (19, [0.0, 0.5, 1.0])
     """
 
     problem: Any
     plain = True
+    #: Multipliers in a kernel, of cycles.
+    monodromy: Any = None
 
     def __init__(
         self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
@@ -212,20 +252,7 @@ class OnMesh(System):
         """Those of boundary and integral conditions."""
         return ("boundary", self.problem.boundary_size), ("integrals", self.problem.integral_size)
 
-    @abstractmethod
-    def _row_sizes(self, x: Array) -> dict[str, Array]:
-        """Return the largest entries of those rows."""
-
-
-#: Times, states, states at the other end and parameters at which functions are evaluated.
-_At = tuple[Array, Array, Array, Array]
-
-
-class BoundaryEquations(OnMesh):
-    """F(x) = 0 of a boundary value problem: collocation (scaled by h), boundary and integral conditions, in this order."""
-
-    #: Multipliers in a kernel, of cycles.
-    monodromy: Any = None
+    # --- the functions of the statement ---------------------------------------------------------------------------
 
     @functools.cached_property
     def _layout(self) -> Layout:
@@ -292,8 +319,38 @@ class BoundaryEquations(OnMesh):
         return residual
 
     def residual(self, x: Array) -> Array:
-        """Return the residual of the discrete equations at x, shape (equations,)."""
-        return self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
+        """Return the residual of the discrete equations at x, shape (equations,); further conditions come last."""
+        inside = self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
+        return np.concatenate([inside, self.condition_values(x)]) if self._further else inside
+
+    # --- conditions beyond those of the problem: each is a row of its own, and may depend on all unknowns ----------
+
+    @property
+    def _further(self) -> int:
+        """Their number, q."""
+        return self.equations - self._conditions
+
+    def condition_values(self, x: Array) -> Array:
+        """Return what vanishes besides, shape (q,)."""
+        return self.conditions_with_rows(x)[0]
+
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return what vanishes besides, shape (q,), and its derivatives by x, shape (q, size)."""
+        return np.empty(0), np.empty((0, self.size))
+
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return their derivatives by any parameters, shape (q, len(names)); 0 where they contain none."""
+        return np.zeros((self._further, len(names)))
+
+    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
+        return np.zeros(self._further)
+
+    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of their derivative along v, multiplied by w (q,), shape (size,); 0 where they are linear."""
+        return np.zeros(self.size)
+
+    # --- F_x -----------------------------------------------------------------------------------------------------
 
     def _linearized(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Factors]:
         """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
@@ -380,7 +437,13 @@ class BoundaryEquations(OnMesh):
         """
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        return self._linearized(x, rows, columns)
+        if not self._further:
+            return self._linearized(x, rows, columns)
+        values, own = self.conditions_with_rows(x)
+        own = np.concatenate([own, columns[:, self._conditions :].T], axis=1)
+        inside = np.ascontiguousarray(columns[:, : self._conditions])
+        residual, factors = self._linearized(x, np.concatenate([own, rows]), inside)
+        return np.concatenate([residual, values]), factors
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
@@ -389,7 +452,8 @@ class BoundaryEquations(OnMesh):
         field = self._field.jacobian(*self._inside(x), of_field)[1]
         ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
-        return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])])
+        integrals = np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])
+        return np.concatenate([collocation, ends, integrals, self.condition_columns(x, names)])
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,), for w (equations,)."""
@@ -400,7 +464,7 @@ class BoundaryEquations(OnMesh):
         result = self._to_nodes(slopes.T, ends @ self._boundary.jacobian(*self._at_ends(x), of_ends)[1][0])
         rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
         np.add.at(result[: self.state_size].reshape(-1, self._n), self._by_interval, rates)
-        return result
+        return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
 
     @property
     def _inner(self) -> int:
@@ -429,7 +493,8 @@ class BoundaryEquations(OnMesh):
         n = self._n
         field = self._field.along(*self._inside(x), [self._wide(v, self.at_gauss_points(v)) for v in directions])
         boundary = self._boundary.along(*self._at_ends(x), [self._wide(v, self._both_ends(v)) for v in directions])[0]
-        return np.concatenate([-(self._h_points * field[:, :n]).ravel(), boundary, self.gauss_weights @ field[:, n:]])
+        integrals, own = self.gauss_weights @ field[:, n:], self.conditions_along(x, directions)
+        return np.concatenate([-(self._h_points * field[:, :n]).ravel(), boundary, integrals, own])
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
@@ -437,7 +502,8 @@ class BoundaryEquations(OnMesh):
         inside, both = self._wide(v, self.at_gauss_points(v)), self._wide(v, self._both_ends(v))
         ends = w[None, self._inner : self._inner + self.problem.boundary_size]
         slopes = self._field.bent(*self._inside(x), self._at_points(w), inside, of_field)
-        return self._to_nodes(slopes, self._boundary.bent(*self._at_ends(x), ends, both, of_ends)[0])
+        found = self._to_nodes(slopes, self._boundary.bent(*self._at_ends(x), ends, both, of_ends)[0])
+        return found + self.conditions_bent(x, w[self._conditions :], v) if self._further else found
 
     def _to_nodes(self, slopes: Array, at_ends: Array | None = None) -> Array:
         """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k).
@@ -565,53 +631,6 @@ class BoundaryEquations(OnMesh):
         assert work is not None
         return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0), work.mesh.whole)
 
-
-#: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
-#: than by one kernel, three the same, ten a twentieth of the time.
-_APART = 30
-#: The t of boundary conditions, which do not take it.
-_TIME = np.zeros(1)
-
-
-@functools.cache
-def _NONE(n: int) -> Array:
-    """Return the absent second state of a function of one point."""
-    return np.empty((0, n))
-
-
-class Collocation(BoundaryEquations):
-    """A problem discretized on a mesh: what the continuation loop works on.
-
-    A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,
-    then the free parameters. A residual, shape (size - 1,) on a curve, holds collocation (scaled by h), boundary and
-    integral conditions.
-
-    Parameters
-    ----------
-    problem : BoundaryValueProblem
-    mesh : ndarray, shape (N + 1,)
-        Mesh points, increasing, from one end of the domain to the other.
-    degree : int
-        Polynomial degree d, 2 to 8 (AUTO's NCOL; N is its NTST).
-    free : sequence of str
-        The free parameters.
-    parameters : mapping of str to float
-        Values of all parameters; those of the free ones are ignored.
-
-    Raises
-    ------
-    ProblemError
-        An unknown parameter, a bad mesh or degree.
-
-    Examples
-    --------
-    >>> from contin import BoundaryValueProblem
-    >>> heat = BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
-    >>> system = Collocation(heat, [0.0, 0.5, 1.0], 4, ["q"], {})
-    >>> system.size, system.nodes.tolist()[::4]  # two states at nine nodes, and q
-    (19, [0.0, 0.5, 1.0])
-    """
-
     # --- meshes that suit a solution -----------------------------------------------------------------------------
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
@@ -730,69 +749,3 @@ class Collocation(BoundaryEquations):
     def index(self) -> Event | None:
         """That of the statement."""
         return self.problem.index
-
-
-class Conditioned(Collocation):
-    """A boundary value problem on a mesh, and further conditions, which come last in the residual.
-
-    Subclasses add the number of them to ``equations`` and say what they are.
-    """
-
-    @abstractmethod
-    def condition_values(self, x: Array) -> Array:
-        """Return the quantities that vanish besides, shape (q,)."""
-
-    @abstractmethod
-    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
-        """Return them, and their derivatives by x, shape (q, size)."""
-
-    @abstractmethod
-    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return their derivatives by any parameters, shape (q, len(names))."""
-
-    @property
-    def linear_conditions(self) -> tuple[Array, Array] | None:
-        """None: they may depend on the unknowns in any way."""
-        return None
-
-    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
-        return np.zeros(self.equations - self._conditions)
-
-    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of their derivative along v, multiplied by w (q,), shape (size,); 0 where they are linear."""
-        return np.zeros(self.size)
-
-    def residual(self, x: Array) -> Array:
-        """Return the residual of the discrete equations at x, the further conditions last."""
-        return np.concatenate([super().residual(x), self.condition_values(x)])
-
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        values, own = self.conditions_with_rows(x)
-        if len(columns):
-            own = np.concatenate([own, columns[:, self._conditions :].T], axis=1)
-        inside = np.ascontiguousarray(columns[:, : self._conditions])
-        residual, factors = self._linearized(x, np.concatenate([own, rows]), inside)
-        return np.concatenate([residual, values]), factors
-
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
-        return np.vstack([super().parameter_columns(x, names), self.condition_columns(x, names)])
-
-    def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
-        own = self.conditions_with_rows(x)[1]
-        return super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
-
-    def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (equations,)."""
-        return np.concatenate([super().along(x, directions), self.conditions_along(x, directions)])
-
-    def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v), shape (size,)."""
-        return super().bent(x, w, v) + self.conditions_bent(x, w[self._conditions :], v)

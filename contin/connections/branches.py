@@ -1,6 +1,4 @@
-"""Branches of connecting orbits: special points on curves of homoclinic orbits.
-
-Special points on curves of homoclinic orbits (Champneys, Kuznetsov & Sandstede 1996; labels as in MatCont).
+"""Special points on curves of homoclinic orbits (Champneys, Kuznetsov & Sandstede 1996; labels as in MatCont).
 
 The eigenvalues of the saddle are those of the manifold that the orbit enters, m1, m2, ... with the largest real part first,
 and those of the manifold that it leaves, l1, l2, ... with the smallest first: the leading ones. Test functions:
@@ -27,21 +25,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.connections.equations import ConnectionEquations
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
-from contin.defining.special_points import EventCurve
-from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
-from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
+from contin.levels import CORRECTED, DOUBLED, LOCATED, ROUGH
 from contin.linalg.orientation import oriented
-from contin.problems.statement import TIME
+
+if TYPE_CHECKING:
+    from contin.connections.equations import ConnectionCollocation
 
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
@@ -49,7 +46,7 @@ _FAR = 0.2
 _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 
 
-def homoclinic_points(system: ConnectionEquations) -> list[Event]:
+def homoclinic_points(system: ConnectionCollocation) -> list[Event]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
@@ -68,7 +65,7 @@ def homoclinic_points(system: ConnectionEquations) -> list[Event]:
     return found
 
 
-def own_test_of(label: str, system: ConnectionEquations, x: Array) -> Event | None:
+def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> Event | None:
     """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
 
     Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
@@ -135,7 +132,7 @@ def crossing(point: Solution) -> tuple[bool, int]:
     return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
 
 
-def ending(system: ConnectionEquations, side: int) -> Event:
+def ending(system: ConnectionCollocation, side: int) -> Event:
     """Return the test function NCH of an end (of orbits to a saddle-node) or side; it is positive on the curve."""
     return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
 
@@ -165,9 +162,9 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     return ("SH", "Shilnikov-Hopf") if point.label == Label.NON_CENTRAL and kinds[nearest] else None
 
 
-def _system(trial: Trial) -> ConnectionEquations:
+def _system(trial: Trial) -> ConnectionCollocation:
     system: Any = trial.system
-    found: ConnectionEquations = system
+    found: ConnectionCollocation = system
     return found
 
 
@@ -268,47 +265,3 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
         return float(unit @ adjoint) if known else _component(unit, adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
-
-
-class ConnectionCollocation(ConnectionEquations):
-    """A `ConnectionProblem` on a mesh."""
-
-    def events(self) -> list[Event]:
-        """Return those of special homoclinic orbits; those of a given time, and orbits between two equilibria, have none."""
-        return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
-
-    def check_solution(self, x: Array) -> None:
-        """Check that an orbit between two equilibria does not return to the first one.
-
-        Raises
-        ------
-        ProblemError
-        """
-        problem = self.problem
-        if problem.homoclinic:
-            return
-        count, names = len(problem.state_names), problem.multipliers
-        first, last = (np.array([self.parameter(x, name) for name in part]) for part in (names[:count], names[count:]))
-        if np.abs(first - last).max() <= APART * float(np.ptp(self.states(x), axis=0).max()):
-            place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
-            raise ProblemError(
-                f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or "
-                f"give a guess of the last equilibrium ({', '.join(names[count:])})"
-            )
-
-    def defining(self, point: Solution, x: Array) -> tuple[EventCurve, Array] | None:
-        """Return that of special homoclinic orbits."""
-        test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
-        return None if test is None else (EventCurve(self, test), x)
-
-    def events_on_curves(self) -> list[Event]:
-        """Return those of homoclinic orbits that are special in another way, too."""
-        return homoclinic_points(self)
-
-    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
-        """Return neutral saddles and the like, by which of the leading eigenvalues are complex."""
-        return named(point, solution)
-
-    def judged(self, point: SpecialPoint) -> SpecialPoint:
-        """Return neutral saddles, and the end of a curve, by which of the leading eigenvalues are complex."""
-        return named(point)

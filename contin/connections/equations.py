@@ -11,20 +11,25 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
-from contin.boundary.system import Conditioned
+from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
 from contin.collocation.newton import Values
 from contin.collocation.projection import Projections, projections
+from contin.connections.branches import homoclinic_points, named, own_test_of
 from contin.core.differences import Numbers, alike, classes, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.spectral import KEPT
 from contin.core.system import Scales, System
+from contin.core.trial import Event, Trial
+from contin.defining.special_points import EventCurve
 from contin.draws import generator
-from contin.errors import ConvergenceError
+from contin.errors import ConvergenceError, ProblemError
+from contin.events.arc import SpecialPoint
+from contin.events.error import Solution
 from contin.levels import APART
 from contin.linalg.blocks import Factors, Share, share
 from contin.problems.angles import WINDING, check_windings
-from contin.problems.statement import Statement
+from contin.problems.statement import TIME, Statement
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
@@ -42,7 +47,7 @@ class SaddleSpectrum(NamedTuple):
         return self.right[:, at], np.asarray(np.linalg.inv(self.right)[at], dtype=complex)
 
 
-class ConnectionEquations(Conditioned):
+class ConnectionCollocation(Collocation):
     """A `ConnectionProblem` on a mesh.
 
     The conditions beyond collocation are rows of their own,
@@ -79,12 +84,7 @@ class ConnectionEquations(Conditioned):
     def _take_mesh(self, mesh: Array) -> None:
         vars(self).pop("_known", None)
         super()._take_mesh(mesh)
-        self.equations = self._conditions + self._further
-
-    @property
-    def _further(self) -> int:
-        """Number of conditions beyond collocation and the equilibria."""
-        return int(sum(self.problem.conditions) + self.problem.saddle_node + 1)
+        self.equations = self._conditions + int(sum(self.problem.conditions) + self.problem.saddle_node + 1)
 
     def _segments(self, numbers: int) -> Share:
         """Return two segments or more: what both ends tell of a long orbit does not say how far it is moved along itself.
@@ -339,7 +339,7 @@ class ConnectionEquations(Conditioned):
         return self._conditions_at_ends(x, ())[0]
 
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
-        """Return these conditions and their derivatives by x."""
+        """Return these conditions, and their derivatives by x."""
         values, by_states, by_parameters = self._conditions_at_ends(x, self.free)
         return values, np.hstack([by_states, by_parameters * self.free_scales])
 
@@ -501,6 +501,48 @@ class ConnectionEquations(Conditioned):
             return None
         renewed = self.with_reference(x)
         return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
+
+    # --- what is known of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[Event]:
+        """Return those of special homoclinic orbits; those of a given time, and orbits between two equilibria, have none."""
+        return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
+
+    def check_solution(self, x: Array) -> None:
+        """Check that an orbit between two equilibria does not return to the first one.
+
+        Raises
+        ------
+        ProblemError
+        """
+        problem = self.problem
+        if problem.homoclinic:
+            return
+        count, names = len(problem.state_names), problem.multipliers
+        first, last = (np.array([self.parameter(x, name) for name in part]) for part in (names[:count], names[count:]))
+        if np.abs(first - last).max() <= APART * float(np.ptp(self.states(x), axis=0).max()):
+            place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
+            raise ProblemError(
+                f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or "
+                f"give a guess of the last equilibrium ({', '.join(names[count:])})"
+            )
+
+    def defining(self, point: Solution, x: Array) -> tuple[EventCurve, Array] | None:
+        """Return that of special homoclinic orbits."""
+        test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
+        return None if test is None else (EventCurve(self, test), x)
+
+    def events_on_curves(self) -> list[Event]:
+        """Return those of homoclinic orbits that are special in another way, too."""
+        return homoclinic_points(self)
+
+    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
+        """Return neutral saddles and the like, by which of the leading eigenvalues are complex."""
+        return named(point, solution)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return neutral saddles, and the end of a curve, by which of the leading eigenvalues are complex."""
+        return named(point)
 
 
 def _spectrum(jacobian: Array) -> SaddleSpectrum:

@@ -8,7 +8,7 @@ from typing import Any
 from contin import errors as checks
 from contin.arrays import Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
-from contin.connections.branches import ConnectionCollocation
+from contin.connections.equations import ConnectionCollocation
 from contin.core.system import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch

@@ -18,15 +18,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
-from contin.cycles.equations import PeriodicEquations
-from contin.cycles.map_equations import MapEquations
 from contin.cycles.normal_forms import MOST
 from contin.defining.critical import CriticalCurve, degenerate, signed_smallest
 from contin.defining.special_points import FoldCurve
@@ -34,6 +32,10 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.interpolated import meeting
 from contin.events.normal_forms import UNKNOWN, Coefficient, coefficient, flip, pair
 from contin.levels import APART, CORRECTED, ROUGH, ROUND_OFF
+
+if TYPE_CHECKING:
+    from contin.cycles.equations import PeriodicCollocation
+    from contin.cycles.map_equations import MapSystem
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
@@ -196,7 +198,7 @@ def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[
     return meeting(arc, test, (_change, distance), _NEAR, stops)
 
 
-def events_on_folds(cycles: PeriodicEquations | MapEquations) -> list[Event]:
+def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
     """Return the test functions of points where a further multiplier is one, or another is -1.
 
     The change of g with the multiplier vanishes where a further one is one.

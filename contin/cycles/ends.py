@@ -24,7 +24,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from contin.core.labels import Label
 from contin.core.newton import correct, nearest_zero
 from contin.core.step import Reason, Stop
 from contin.core.trial import Event, Trial, linearization
-from contin.cycles.equations import CycleEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, find_zero
 from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, MOST_UPDATES, ROUND_OFF, TINY
@@ -41,6 +40,9 @@ from contin.linalg.matrices import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
 from contin.problems.statement import PERIOD
+
+if TYPE_CHECKING:
+    from contin.cycles.equations import CycleCollocation
 
 #: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
 #: larger, homoclinic points are known to 1e-14 and not to the last digit.
@@ -121,7 +123,7 @@ def _speeds(system: Any, x: Array) -> Array:
     return np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
 
 
-def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:
+def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
     """Return the equilibrium that Newton's method finds from where a cycle is slowest; None where it finds none.
 
     Returns
@@ -140,13 +142,13 @@ def equilibrium_beside(system: CycleEquations, x: Array) -> tuple[Array, Complex
     return np.where(np.abs(states) > CORRECTED * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
 
 
-def _spectrum(system: CycleEquations, x: Array, states: Array) -> ComplexArray:
+def _spectrum(system: CycleCollocation, x: Array, states: Array) -> ComplexArray:
     """Return the eigenvalues of an equilibrium, the largest real part first."""
     values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
     return values[np.argsort(-values.real)]
 
 
-def _fold_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray] | None:
+def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
     """Return the equilibrium of a saddle-node beside a cycle, as `equilibrium_beside` does; None where there is none.
 
     Beyond a saddle-node there is no equilibrium. That of the nearest value of the parameter p comes from Newton's method for
@@ -173,7 +175,7 @@ def _fold_beside(system: CycleEquations, x: Array) -> tuple[Array, ComplexArray]
     return found[:-1], _spectrum(system, with_parameter(found[-1]), found[:-1])
 
 
-def resting_place(system: CycleEquations, x: Array) -> RestingPlace | None:
+def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
     points, speeds = system.at_gauss_points(x), _speeds(system, x)
     if not speeds.min() < _SLOW * speeds.max():
@@ -209,7 +211,7 @@ class Limit:
         return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
 
 
-def limit_of_parameter(system: CycleEquations, x: Array, place: RestingPlace) -> Limit | None:
+def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) -> Limit | None:
     """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
 
     Near a saddle p - limit = A exp(-k T), so that the limit is p + (dp/dT) / k; k is an eigenvalue's real part, up to its sign,
@@ -249,7 +251,7 @@ def limit_of_parameter(system: CycleEquations, x: Array, place: RestingPlace) ->
     return Limit(name, float(limit), float(error)) if np.isfinite(error) else None
 
 
-def explained(system: CycleEquations, stop: Stop, x: Array) -> Stop:
+def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
     """Return the end of a branch, where the period runs away with the equilibrium near which the cycle spends its time.
 
     With the limit of the parameter, if it is known.
@@ -265,7 +267,7 @@ def explained(system: CycleEquations, stop: Stop, x: Array) -> Stop:
     return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)
 
 
-def _at_period(system: CycleEquations, x: Array, at: int, less: float) -> tuple[float, float]:
+def _at_period(system: CycleCollocation, x: Array, at: int, less: float) -> tuple[float, float]:
     """Return the parameter p at a place of the unknowns, and dp/dT, at a period that is shorter by ``less``.
 
     Raises
@@ -286,7 +288,7 @@ def _at_period(system: CycleEquations, x: Array, at: int, less: float) -> tuple[
 AMPLITUDE = Event(Label.HOPF, "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
-def hopf_point_inside(system: CycleEquations, arc: Arc) -> SpecialPoint | None:
+def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None:
     """Return the Hopf point inside a step of a branch of cycles, or None."""
     before, trial = arc.before.value(AMPLITUDE), arc.trial.value(AMPLITUDE)
     if not before > 0 > trial:
@@ -304,7 +306,7 @@ def hopf_point_inside(system: CycleEquations, arc: Arc) -> SpecialPoint | None:
     return SpecialPoint(at, Label.HOPF, "Hopf", there, stop, details, errors=sizes)
 
 
-def shrunk(system: CycleEquations, point: SpecialPoint) -> SpecialPoint:
+def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where cycles have shrunk onto an equilibrium.
 
     Beyond the Hopf point the branch is itself, half a period later.
@@ -315,7 +317,7 @@ def shrunk(system: CycleEquations, point: SpecialPoint) -> SpecialPoint:
     return dataclasses.replace(point, label=Label.HOPF, name="Hopf", stop=stop)
 
 
-def _hopf_point(system: CycleEquations, guess: Array) -> tuple[Array, float, Array]:
+def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:
     """Return the unknowns of the Hopf point near a small cycle, its frequency, and the errors of the free parameters.
 
     Raises
@@ -354,7 +356,7 @@ def _hopf_point(system: CycleEquations, guess: Array) -> tuple[Array, float, Arr
     return x, frequency, errors
 
 
-def _critical(system: CycleEquations, x: Array, states: Array, expected: complex) -> complex:
+def _critical(system: CycleCollocation, x: Array, states: Array, expected: complex) -> complex:
     """Return the eigenvalue, nearest to an expected one, at the equilibrium that is put into ``states``, a view of x.
 
     Raises

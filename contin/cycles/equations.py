@@ -12,15 +12,23 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
-from contin.boundary.system import Collocation, Conditioned
+from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
 from contin.collocation.mesh import MeshControl
 from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
 from contin.core.protocol import Carrier
 from contin.core.spectral import KEPT, on_circle
+from contin.core.step import COLLAPSED, Reason, Stop
 from contin.core.system import Scales
+from contin.core.trial import Event, Trial
+from contin.cycles.branches import OfCycles, cycle_in_phase, forced_cycle_in_phase, lasting
+from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_inside, shrunk
+from contin.cycles.floquet import has_double_one, keep_off_one
+from contin.cycles.normal_forms import CycleForm
 from contin.draws import ASIDE
 from contin.errors import ProblemError
+from contin.events.arc import Arc, SpecialPoint
+from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Columns
 from contin.levels import APART, DOUBLED, LOCATED
 from contin.linalg.blocks import Blocks, Factors
@@ -37,7 +45,7 @@ _SPLIT = 100.0
 _PERIOD_SHARE = 0.1
 
 
-class PeriodicEquations(Collocation):
+class PeriodicCollocation(OfCycles, Collocation):
     """A `CycleProblem` on a mesh: what forced and autonomous ones share.
 
     Attributes
@@ -306,8 +314,32 @@ class PeriodicEquations(Collocation):
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
 
+    # --- what is known of its branches --------------------------------------------------------------------------
 
-class ForcedEquations(PeriodicEquations):
+    @property
+    def monodromy(self) -> Monodromy:
+        """Where a kernel computes the multipliers."""
+        return monodromy_of(self)
+
+    def cannot_branch(self, arc: Arc) -> bool:
+        """Return whether no multiplier but the one that is 1 comes near 1: that is where cycles branch."""
+        return keep_off_one(arc)
+
+    def form(self, x: Array) -> CycleForm:
+        """Return that of a cycle."""
+        return CycleForm(self, x)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return those of folds, period doublings and torus bifurcations.
+
+        These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.
+        """
+        if point.is_simple and has_double_one(self, point.trial.x):
+            return None
+        return at_special_point(self, point)
+
+
+class ForcedCollocation(PeriodicCollocation):
     """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.
 
     Raises
@@ -348,8 +380,14 @@ class ForcedEquations(PeriodicEquations):
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
         return None if is_opposite(frequency) else ("TR", "torus")
 
+    # --- what is known of its branches --------------------------------------------------------------------------
 
-class CycleEquations(Conditioned, PeriodicEquations):
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle of several rounds, or one with an image, and vectors at it, to lie closest to another one."""
+        return forced_cycle_in_phase(self, x, vectors, reference)
+
+
+class CycleCollocation(PeriodicCollocation):
     """An autonomous `CycleProblem` on a mesh.
 
     The phase condition, the integral of u . v' over that of v' . v', is linear: one row beside the collocation equations,
@@ -392,10 +430,6 @@ class CycleEquations(Conditioned, PeriodicEquations):
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
-    def condition_values(self, x: Array) -> Array:
-        """Return the phase condition, shape (1,)."""
-        return np.array([self._phase @ x - self._target])
-
     @property
     def linear_conditions(self) -> tuple[Array, Array]:
         """The row of the phase condition, and its value."""
@@ -403,11 +437,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
 
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
         """Return the phase condition and its row."""
-        return self.condition_values(x), self._phase[None]
-
-    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return zeros: the phase condition contains no parameter."""
-        return np.zeros((1, len(names)))
+        return np.array([self._phase @ x - self._target]), self._phase[None]
 
     # --- stability -----------------------------------------------------------------------------------------------
 
@@ -490,7 +520,7 @@ class CycleEquations(Conditioned, PeriodicEquations):
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
-    def _with(self, **changes: object) -> CycleEquations:
+    def _with(self, **changes: object) -> CycleCollocation:
         other: Any = super()._with(**changes)
         other._set_reference(self.reference)
         return other
@@ -528,6 +558,62 @@ class CycleEquations(Conditioned, PeriodicEquations):
             return None
         other = self._referring_to(states)
         return (other, np.array) if mesh is None else other.on_mesh(mesh)
+
+    # --- what is known of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[Event]:
+        """Return also that of homoclinic orbits; in the plane that alone: beside 1 there is one positive multiplier."""
+        is_planar = self.states_count == 2 and self.order == 1
+        return [homoclinic()] if is_planar else [*super().events(), homoclinic()]
+
+    @property
+    def size_of_solutions(self) -> Event:
+        """The amplitude: cycles can shrink onto an equilibrium."""
+        return AMPLITUDE
+
+    def referring_to(self, x: Array, tangent: Array) -> CycleCollocation:
+        """Return the same with a cycle as the reference; in place of one of no size, the one beside it along the tangent."""
+        if np.ptp(self.states(x), axis=0).any():
+            return self.with_reference(x)
+        return self.with_reference(x + tangent / np.abs(tangent).max()) if np.isfinite(tangent).all() else self
+
+    def home(self, arc: Arc) -> SpecialPoint | None:
+        """Return the Hopf point inside a step."""
+        return hopf_point_inside(self, arc)
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""
+        return abs(self.amplitude(z)) < COLLAPSED * abs(self.amplitude(x))
+
+    def may_branch(self, x: Array) -> bool:
+        """Return False where cycles shrink onto an equilibrium: there the branch ends, and the search takes long."""
+        return not self.has_shrunk(x)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, as the end where cycles shrink, or go twice round ones of half the period."""
+        found = shrunk(self, point)
+        return super().judged(point) if found is point else found
+
+    def standstill(self, trial: Trial, primary: str) -> Stop:
+        """Return the end of a family at one value of the parameter: cycles of a Hamiltonian or linear system fill an area."""
+        value = LOCATED * round(trial[primary] / LOCATED) + 0.0
+        message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
+        if primary == PERIOD:
+            return Stop(Reason.STANDSTILL, message, "all its cycles have this period; follow another parameter")
+        unfolds = f"where {primary} must be a parameter that breaks the conservation (unfolds it)"
+        return Stop(Reason.STANDSTILL, message, f'follow it with primary="{PERIOD}", {unfolds}')
+
+    def explained(self, stop: Stop, trial: Trial) -> Stop:
+        """Return the end where the period runs away with the equilibrium, and with the limit of the parameter."""
+        return explained(self, stop, trial.x)
+
+    def lasting(self, x: Array) -> Array:
+        """Return free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""
+        return lasting(self, x)
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle, and vectors at it, shifted in time to lie closest to another one."""
+        return cycle_in_phase(self, x, vectors, reference)
 
 
 def _turns(times: Array) -> Indices:

@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,8 +26,6 @@ from contin.core.spectral import changes_of_multipliers
 from contin.core.step import Reason, Stop
 from contin.core.trial import Event, Trial, sign_changed
 from contin.cycles.ends import is_still
-from contin.cycles.equations import PeriodicEquations
-from contin.cycles.map_equations import MapEquations
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.dips import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near, separated
@@ -37,6 +35,10 @@ from contin.events.labelled import finding_of, frequency_of
 from contin.events.normal_forms import flip, pair
 from contin.events.refinement import ASIDE
 from contin.levels import LOCATED
+
+if TYPE_CHECKING:
+    from contin.cycles.equations import PeriodicCollocation
+    from contin.cycles.map_equations import MapSystem
 
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
@@ -144,12 +146,12 @@ def _apart(values: ComplexArray, others: ComplexArray) -> Array:
     return gaps[linear_sum_assignment(gaps)]
 
 
-def _trivial(system: PeriodicEquations | MapEquations, x: Array) -> int | None:
+def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
     """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
     return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
 
 
-def unstable(system: PeriodicEquations | MapEquations, x: Array, least: float = LOCATED) -> int:
+def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = LOCATED) -> int:
     """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
 
     Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:
@@ -162,7 +164,7 @@ def unstable(system: PeriodicEquations | MapEquations, x: Array, least: float = 
     return int(np.count_nonzero(outside))
 
 
-def has_double_one(system: PeriodicEquations, x: Array) -> bool:
+def has_double_one(system: PeriodicCollocation, x: Array) -> bool:
     """Return whether a multiplier is 1 beside the one that always is, as far as can be told: that of a Jordan block may be off.
 
     In a conservative system it is along the whole family.
@@ -203,7 +205,7 @@ def doubles(point: Any) -> bool:
     return point.label == Label.PERIOD_DOUBLING or (point.label == Label.BRANCH_POINT and isinstance(point.details, dict))
 
 
-def doubled(system: PeriodicEquations | MapEquations, point: SpecialPoint) -> SpecialPoint:
+def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a cycle comes to go twice round one of half its period.
 
     Beyond it the branch is itself, half a period on.
@@ -280,7 +282,7 @@ def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newto
     return len(values) == 2 and sign_changed(*values)
 
 
-def critical_angle(system: PeriodicEquations | MapEquations, point: object, x: Array) -> float:
+def critical_angle(system: PeriodicCollocation | MapSystem, point: object, x: Array) -> float:
     """Return the angle of the pair on the circle at a torus bifurcation x: that of the point or, if unknown, of the nearest."""
     known = frequency_of(point)
     if known is not None:

@@ -10,9 +10,13 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.spectral import on_circle
 from contin.core.system import Scales
+from contin.cycles.branches import OfCycles, map_in_phase
 from contin.cycles.equations import is_opposite, is_pair
-from contin.equilibria.equations import AlgebraicEquations
+from contin.cycles.normal_forms import MOST, MapForm
+from contin.equilibria.equations import Algebraic
+from contin.events.arc import SpecialPoint
 from contin.events.dips import NO_MULTIPLIER
+from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Batch
 from contin.levels import DOUBLED
 from contin.linalg.blocks import MANY
@@ -21,7 +25,7 @@ from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.statement import ROUNDS, rounds_of
 
 
-class MapEquations(AlgebraicEquations):
+class MapSystem(OfCycles, Algebraic):
     """Cycles u_1 ... u_k of a map: f(u_j, p) - u_(j+1) = 0, with u_(k+1) = u_1. There are no scales.
 
     All points are unknowns, so that the equations are as nonlinear as f, and not as f applied k times: other cycles, which may
@@ -105,7 +109,7 @@ class MapEquations(AlgebraicEquations):
         """Return the derivatives of a parameter or functional by x, shape (size,)."""
         names = tuple(self.problem.functionals)
         if name not in names:
-            return super(AlgebraicEquations, self).column_gradient(x, name)
+            return super(Algebraic, self).column_gradient(x, name)
         batch = self.problem.batch("functionals")
         here = batch.jacobian(*self._arguments(x, self.states(x)[:1]), batch.columns(self._free))[1][0, names.index(name)]
         gradient = np.zeros(self.size)
@@ -230,7 +234,7 @@ class MapEquations(AlgebraicEquations):
         """Return the derivative of `column_gradient` along v, shape (size,)."""
         names = tuple(self.problem.functionals)
         if name not in names:
-            return super(AlgebraicEquations, self).column_bent(x, name, v)
+            return super(Algebraic, self).column_bent(x, name, v)
         batch, weights = self.problem.batch("functionals"), np.zeros((1, len(names)))
         weights[0, names.index(name)] = 1.0
         given = *self._arguments(x, self.states(x)[:1]), weights, self._wide(v, self.states(v)[:1])
@@ -300,6 +304,26 @@ class MapEquations(AlgebraicEquations):
         states = self.states(x)
         return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
 
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapEquations, Array]:
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""
         return self, x
+
+    # --- what is known of its branches --------------------------------------------------------------------------
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The map, of fixed points."""
+        known: Batch = self.problem.batch("map")
+        return known if type(self) is MapSystem and self.rounds == 1 else None
+
+    def form(self, x: Array) -> MapForm:
+        """Return that of a cycle of the map."""
+        return MapForm(self, x)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return those of folds, period doublings and torus bifurcations; None of very long cycles."""
+        return None if self.state_size > MOST else at_special_point(self, point)
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle, which may begin with any of its points, and vectors at it, to lie closest to another one."""
+        return map_in_phase(self, x, vectors, reference)

@@ -52,18 +52,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from contin.arrays import Array, Numbers
 from contin.core.differences import of_complex
-from contin.cycles.equations import PeriodicEquations
-from contin.cycles.map_equations import MapEquations
 from contin.draws import generator
 from contin.events.normal_forms import DenseForm, Direction, Form
 from contin.linalg.border import Borders
 from contin.problems.statement import PERIOD
+
+if TYPE_CHECKING:
+    from contin.cycles.equations import PeriodicCollocation
+    from contin.cycles.map_equations import MapSystem
 
 
 class Collocated:
@@ -77,7 +79,7 @@ class Collocated:
         Number of rows of C.
     """
 
-    def __init__(self, system: PeriodicEquations, x: Array) -> None:
+    def __init__(self, system: PeriodicCollocation, x: Array) -> None:
         n = system.states_count
         # In general position to the states at both ends that the equations admit: with ten seeds, a normal form at 16 states
         # changes by 1e-13 of its value.
@@ -196,7 +198,7 @@ class Round:
 
     Parameters
     ----------
-    system : PeriodicEquations
+    system : PeriodicCollocation
     x : ndarray, shape (size,)
     phased : bool
         With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of autonomous
@@ -213,7 +215,7 @@ class Round:
     size: int
     collocated: Collocated
 
-    def __init__(self, system: PeriodicEquations, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
+    def __init__(self, system: PeriodicCollocation, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
         self.system, self.phased, self._x = system, phased, x
         self.states, self.n = system.state_size, system.states_count
         self.size = self.states + phased
@@ -255,13 +257,13 @@ class MapForm(DenseForm):
 
     Parameters
     ----------
-    system : MapEquations
+    system : MapSystem
     x : ndarray, shape (size,)
     """
 
     doubled_side = -1
 
-    def __init__(self, system: MapEquations, x: Array) -> None:
+    def __init__(self, system: MapSystem, x: Array) -> None:
         size, n = system.state_size, len(system.problem.state_names)
         matrix = system.jacobian(x)
         matrix[np.arange(size - n, size), np.arange(n)] += 1.0  # of the first point itself: P stands there
@@ -281,11 +283,11 @@ class CycleForm(Form):
 
     Parameters
     ----------
-    system : PeriodicEquations
+    system : PeriodicCollocation
     x : ndarray, shape (size,)
     """
 
-    def __init__(self, system: PeriodicEquations, x: Array) -> None:
+    def __init__(self, system: PeriodicCollocation, x: Array) -> None:
         self.system, self.x = system, x
         self._around = Round(system, x, phased=False)
         self._period = float(x[system.parameter_index(PERIOD)]) if system.autonomous else 1.0  # as it stands in x

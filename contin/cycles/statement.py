@@ -15,7 +15,8 @@ from contin.arrays import Array, Function, Named, Places
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.mesh import CYCLE_DEGREE
 from contin.core.system import Scales
-from contin.cycles.branches import CycleCollocation, ForcedCollocation, MapSystem, PeriodicCollocation
+from contin.cycles.equations import CycleCollocation, ForcedCollocation, PeriodicCollocation
+from contin.cycles.map_equations import MapSystem
 from contin.draws import PLACES, generator
 from contin.equilibria.statement import AlgebraicProblem, ReducedProblem
 from contin.errors import ProblemError

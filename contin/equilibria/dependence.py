@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
 from contin.draws import ASIDE, PLACES, generator
-from contin.equilibria.equations import AlgebraicEquations
 from contin.levels import APART, CERTAIN, LOCATED
 from contin.linalg.matrices import DenseFactors
 from contin.text import COLUMNS
+
+if TYPE_CHECKING:
+    from contin.equilibria.equations import Algebraic
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000
@@ -27,7 +29,7 @@ MOST_STATES = 1000
 _SIZES = (1.0, 0.1, 3.0, 10.0, 100.0)
 
 
-def dependence(system: AlgebraicEquations, x: Array) -> str:
+def dependence(system: Algebraic, x: Array) -> str:
     """Return which equations are dependent near x, or which states occur only together, as a sentence with advice; or ""."""
     if system.size != system.state_size or system.size > MOST_STATES:
         return ""
@@ -75,7 +77,7 @@ def conservation_laws(problem: Any) -> Array:
     return none if any(problem.angles.get(problem.state_names[i]) for i in np.flatnonzero(found.any(axis=0))) else found
 
 
-def _around(system: AlgebraicEquations, x: Array) -> list[Array]:
+def _around(system: Algebraic, x: Array) -> list[Array]:
     """Return places near x where the equations are defined; above x first, where logarithms and roots are."""
     random, found = generator("dependence"), []
     for sign in np.repeat((1.0, -1.0), PLACES):
@@ -127,7 +129,7 @@ def _first(vector: Array) -> int:
     return int(np.flatnonzero(vector)[0])
 
 
-def _of_equations(system: AlgebraicEquations, places: Sequence[Array], vectors: Array, is_shifted: bool) -> str:
+def _of_equations(system: Algebraic, places: Sequence[Array], vectors: Array, is_shifted: bool) -> str:
     """Return what is said of combinations of equations that are constants."""
     if not len(vectors):
         return ""
@@ -148,7 +150,7 @@ def _of_equations(system: AlgebraicEquations, places: Sequence[Array], vectors: 
     return f"residual: {what}: put {condition} {totals}, where the equations are rates of these{held}, in place of {replaced}"
 
 
-def _of_states(system: AlgebraicEquations, vectors: Array) -> str:
+def _of_states(system: Algebraic, vectors: Array) -> str:
     if not len(vectors):
         return ""
     names = system.named_states

@@ -11,11 +11,20 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.collocation.mesh import MeshControl
 from contin.core.differences import derivative, of_lines
+from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import Spectral, may_be_on_axis, off_axis
 from contin.core.system import Scales, System, largest_entries, usual
+from contin.core.trial import Event
+from contin.defining.critical import HopfCurve
 from contin.draws import ASIDE, generator, signs
+from contin.equilibria.branches import HOMOCLINIC, critical_pair, events_on_folds, form_of, has_pair
+from contin.equilibria.dependence import dependence
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
+from contin.events.hopf import hopf
+from contin.events.labelled import frequency_of
+from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
 from contin.functions.batch import Batch, Columns
 from contin.levels import CERTAIN, CORRECTED, LOCATED
 from contin.linalg.blocks import MANY, Factors
@@ -75,8 +84,24 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
         raise ProblemError(f"jacobian: {what} is {numbers} (by differences of the residual)")
 
 
-class AlgebraicEquations(Spectral, System):
-    """F(u, p) = 0 with chosen free parameters: the equations of an `Algebraic`."""
+class Algebraic(Spectral, System):
+    """An algebraic problem with chosen free parameters, as the continuation sees it.
+
+    Unknowns ``x`` are the states, then the free parameters. The interface is that of
+    `contin.lowlevel.Collocation`; there is no mesh to adapt.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem
+    >>> system = Algebraic(AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0}), ["a"])
+    >>> system.size, system.residual(np.array([2.0, 1.0])).tolist()  # x = 2, a = 1
+    (2, [-3.0])
+    """
 
     intervals = 0
     degree = 0
@@ -291,7 +316,7 @@ class AlgebraicEquations(Spectral, System):
         """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
         return self._jacobian(x)[1][:, : self.state_size]
 
-    def as_field(self) -> AlgebraicEquations:
+    def as_field(self) -> Algebraic:
         """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
         if self.scales.are_one:
             return self
@@ -353,7 +378,7 @@ class AlgebraicEquations(Spectral, System):
         given = _NO_TIME, x[:n].reshape(1, -1), self._none, self._scaled_parameters(x)
         return batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
 
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[AlgebraicEquations, Array]:
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
         z = self.carrier(scaled)(x)
@@ -364,12 +389,12 @@ class AlgebraicEquations(Spectral, System):
 
         return self._with(scales=Scales(states, parameters, {"residual": usual(largest_entries(entries, z))})), z
 
-    def without_scales(self, x: Array) -> tuple[AlgebraicEquations, Array]:
+    def without_scales(self, x: Array) -> tuple[Algebraic, Array]:
         """Return the same problem in the user's units, and x for it."""
         other = self._with(scales=None)
         return other, self.carrier(other)(x)
 
-    def _with(self, **changes: Any) -> AlgebraicEquations:
+    def _with(self, **changes: Any) -> Algebraic:
         """Return the same with other free parameters, parameters or scales."""
         kept = {"free": self.free, "parameters": dict(zip(self.problem.parameters, self.parameters)), "scales": self.scales}
         return type(self)(self.problem, **{**kept, **changes})
@@ -384,15 +409,85 @@ class AlgebraicEquations(Spectral, System):
     def adapted(self, x: Array, control: MeshControl) -> None:
         """Return None: there is no mesh."""
 
-    def with_parameters(self, values: Mapping[str, float]) -> AlgebraicEquations:
+    def with_parameters(self, values: Mapping[str, float]) -> Algebraic:
         """Return the same problem with other values of parameters that are not free."""
         return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
 
-    def with_free(self, free: Sequence[str], x: Array) -> tuple[AlgebraicEquations, Array]:
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with other free parameters (values from x), and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
+
+    # --- what is known of its branches --------------------------------------------------------------------------
+
+    #: Kinds of curves in two parameters that begin at, or pass, points of codimension two.
+    leaving = {
+        Label.BOGDANOV_TAKENS: (Label.FOLD, Label.HOPF, HOMOCLINIC),
+        Label.GENERALIZED_HOPF: (Label.FOLD,),
+        Label.ZERO_HOPF: (Label.FOLD, Label.HOPF, Label.TORUS),
+        Label.DOUBLE_HOPF: (Label.HOPF, Label.TORUS),
+    }
+
+    def events(self) -> list[Event]:
+        """Return the test function of Hopf points, where the states move in time."""
+        return [hopf()] if self.problem.dynamics and self.state_size > 1 else []
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The residual; None of kinds that are made of this one, whose equations may be others, and with a given Jacobian."""
+        known: Batch = self._residual
+        return known if type(self) is Algebraic and self.problem.jacobian is None else None
+
+    @property
+    def starts_cycles(self) -> bool:
+        """Where the states move in time."""
+        return bool(self.problem.dynamics)
+
+    @property
+    def stored(self) -> dict[str, Array]:
+        """Parameters and sizes."""
+        return self._own_arrays
+
+    def unstable(self, x: Array) -> int | None:
+        """Return the number of unstable eigenvalues; None of large problems, and where nothing moves in time."""
+        return None if self.is_sparse or not self.problem.dynamics else int(np.count_nonzero(self.eigenvalues(x).real > 0))
+
+    def undetermined(self, x: Array) -> str:
+        """Return which equations are dependent."""
+        return dependence(self, x)
+
+    def check_solution(self, x: Array) -> None:
+        """Check that totals which were found to be conserved are so at a solution, too."""
+        self.problem.check_totals(self.states(x)[0], self.all_parameters(x))
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """That of Hopf points."""
+        return {HopfCurve.kind: HopfCurve}
+
+    def defining(self, point: Any, x: Array) -> tuple[HopfCurve, Array] | None:
+        """Return that of Hopf points."""
+        if point.label != HopfCurve.kind:
+            return None
+        pair = critical_pair(self.jacobian(x), frequency_of(point))
+        return (HopfCurve(self.as_field(), size=pair.frequency**2), np.append(x, 1.0)) if pair.is_critical else None
+
+    def events_on_folds(self) -> list[Event]:
+        """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""
+        return events_on_folds() if self.problem.dynamics else []
+
+    def form(self, x: Array) -> DenseForm:
+        """Return that of an equilibrium."""
+        return form_of(self, x)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return the first Lyapunov coefficient at a Hopf point; of folds, which take .3 ms, nothing."""
+        if point.test is None or point.test.normal_form is fold:
+            return None
+        frequency = frequency_of(point)
+        is_of_the_field = frequency is None or has_pair(self.jacobian(point.trial.x), frequency)
+        return at_special_point(self, point) if is_of_the_field else None
 
 
 #: Largest part of its entries that may differ from zero.

@@ -14,8 +14,8 @@ from contin import errors as checks
 from contin.arrays import Array, Function, Places
 from contin.collocation.mesh import MOST_INTERVALS
 from contin.core.system import Scales
-from contin.equilibria.branches import Algebraic
 from contin.equilibria.dependence import conservation_laws, written
+from contin.equilibria.equations import Algebraic
 from contin.errors import ProblemError, warn
 from contin.functions import round_off
 from contin.functions.batch import Batch

@@ -19,7 +19,7 @@ from contin.core.labels import Label
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.cycles.statement import CycleProblem
-from contin.equilibria.branches import Algebraic
+from contin.equilibria.equations import Algebraic
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.angles import windings

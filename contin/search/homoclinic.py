@@ -23,12 +23,12 @@ import numpy as np
 from contin import errors as checks
 from contin.arrays import Array
 from contin.collocation.mesh import MeshControl, usual_degree
-from contin.connections.branches import ConnectionCollocation
+from contin.connections.equations import ConnectionCollocation
 from contin.connections.statement import ConnectionProblem
 from contin.core.newton import Newton, nearest_zero
-from contin.cycles.branches import CycleCollocation
 from contin.cycles.ends import equilibrium_beside
-from contin.equilibria.branches import Algebraic
+from contin.cycles.equations import CycleCollocation
+from contin.equilibria.equations import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH
 from contin.linalg.orientation import first_least, oriented

@@ -14,7 +14,8 @@ from contin.arrays import Array
 from contin.boundary.fields import Fields
 from contin.boundary.oscillating import TIMES, oscillating, turned
 from contin.collocation.mesh import CYCLE_DEGREE, MeshControl
-from contin.connections.branches import ConnectionCollocation, crossing, ending
+from contin.connections.branches import crossing, ending
+from contin.connections.equations import ConnectionCollocation
 from contin.connections.statement import ConnectionProblem
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
@@ -23,10 +24,12 @@ from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.system import usual
 from contin.core.trial import Trial, linearization
-from contin.cycles.branches import CycleCollocation, MapSystem, PeriodicCollocation
+from contin.cycles.equations import CycleCollocation, PeriodicCollocation
 from contin.cycles.floquet import doubles
+from contin.cycles.map_equations import MapSystem
 from contin.cycles.statement import CycleProblem
-from contin.equilibria.branches import Algebraic, CriticalPair, critical_pair
+from contin.equilibria.branches import CriticalPair, critical_pair
+from contin.equilibria.equations import Algebraic
 from contin.errors import ConvergenceError, ProblemError, warn
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import finding_of, frequency_of

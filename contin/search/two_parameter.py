@@ -40,7 +40,7 @@ import numpy as np
 from contin import errors as checks
 from contin.arrays import Array, ComplexArray
 from contin.collocation.mesh import CYCLE_DEGREE
-from contin.connections.branches import ConnectionCollocation
+from contin.connections.equations import ConnectionCollocation
 from contin.connections.statement import ConnectionProblem
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
@@ -54,7 +54,8 @@ from contin.cycles.curves import TorusCurve
 from contin.defining.critical import HopfCurve
 from contin.defining.special_points import BranchPointCurve, EventCurve, ExtremumCurve, FoldCurve
 from contin.defining.system import Defining
-from contin.equilibria.branches import HOMOCLINIC, Algebraic, critical_pair
+from contin.equilibria.branches import HOMOCLINIC, critical_pair
+from contin.equilibria.equations import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import APART, ROUGH
 from contin.problems.statement import TIME

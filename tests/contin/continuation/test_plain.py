@@ -9,7 +9,7 @@ import pytest
 
 from contin import AlgebraicProblem, Event, MapProblem, Settings
 from contin.continuation import lane as runs
-from contin.cycles.branches import MapSystem
+from contin.cycles.map_equations import MapSystem
 from contin.lowlevel import Algebraic, Continuation
 
 

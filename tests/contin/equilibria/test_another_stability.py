@@ -7,7 +7,7 @@ import pytest
 from scipy.special import lambertw
 
 import contin
-from contin.equilibria.branches import Algebraic
+from contin.equilibria.equations import Algebraic
 from contin.events.hopf import hopf
 
 
