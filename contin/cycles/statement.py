@@ -289,7 +289,7 @@ class CycleProblem(BoundaryValueProblem):
         Examples
         --------
         >>> CycleProblem(lambda u, p: (u.v, -p.k * u.x), ["x", "v"], {"k": 4.0}).usual_degree(1e-12)
-        4
+        6
         """
         return CYCLE_DEGREE
 
