@@ -26,6 +26,7 @@ from contin.draws import generator
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
+from contin.functions.origin import Place, not_finite
 from contin.levels import APART
 from contin.linalg.blocks import Factors, Share, share
 from contin.problems.angles import WINDING, check_windings
@@ -147,7 +148,8 @@ class ConnectionCollocation(Collocation):
         def made(place: Array) -> _Linear:
             jacobian = self._jacobian_at(place[0], p)
             if not np.isfinite(jacobian).all():
-                raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
+                where = not_finite(Place(self.problem.batch("vector field"), 0.0, [*place[0], *p]))
+                raise ConvergenceError(f"the Jacobian of the vector field at the equilibrium is not finite: {where}")
             return _Linear(jacobian)
 
         def both() -> list[_Linear]:

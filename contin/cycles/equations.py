@@ -26,7 +26,7 @@ from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_insi
 from contin.cycles.floquet import has_double_one, keep_off_one
 from contin.cycles.normal_forms import CycleForm
 from contin.draws import ASIDE
-from contin.errors import ProblemError
+from contin.errors import ConvergenceError, ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Columns
@@ -584,6 +584,18 @@ class CycleCollocation(PeriodicCollocation):
     def collapsed(self, x: Array, z: Array) -> bool:
         """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""
         return abs(self.amplitude(z)) < COLLAPSED * abs(self.amplitude(x))
+
+    def check_solution(self, x: Array) -> None:
+        """Check that a cycle that was looked for is none of no size.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        if self.has_shrunk(x):
+            place = self.states(x)[0]
+            where = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(self.problem.state_names, place))
+            raise ConvergenceError(f"the guess leads to the equilibrium {where}: give one closer to a cycle, or a larger one")
 
     def may_branch(self, x: Array) -> bool:
         """Return False where cycles shrink onto an equilibrium: there the branch ends, and the search takes long."""

@@ -159,8 +159,8 @@ def rows_fit(tangents: Array, weights: Array) -> bool:
 
 
 def cosine(a: Array, b: Numbers) -> float:
-    """Return the absolute cosine between a real vector and a real or complex one."""
-    return float(abs(a @ b) / np.sqrt((a @ a) * float(np.vdot(b, b).real)))
+    """Return the absolute cosine between a real vector and a real or complex one; 0 where one has no length."""
+    return float(abs(a @ b) / (np.sqrt((a @ a) * float(np.vdot(b, b).real)) or 1.0))
 
 
 def orthonormal(vectors: Array, weights: Array | float = 1.0) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,10 +21,12 @@ import numpy as np
 from contin import draws
 from contin import errors as checks
 from contin.arrays import Array, Indices
-from contin.boundary.statement import BoundaryValueProblem
+from contin.boundary.statement import BoundaryValueProblem, SegmentedProblem
+from contin.connections.statement import ConnectionProblem
 from contin.core.labels import Label
 from contin.core.newton import UNITS, Corrected, Newton, approached, correct
 from contin.core.system import System
+from contin.cycles.statement import CycleProblem
 from contin.equilibria.dependence import reduced
 from contin.errors import ConvergenceError
 from contin.functions.origin import Place, jump, not_finite
@@ -51,6 +53,7 @@ def recovered(system: System, x: Array, newton: Newton, singular: bool) -> Corre
         for place in approached(system, start):
             with contextlib.suppress(ConvergenceError):
                 done = correct(system, place, newton=newton, sizes=system.magnitudes)
+                system.check_solution(done.x)
                 return looked_at(system, done) if singular else done
     return None if starts[-1] is x else _singular_solution(system, starts[-1])
 
@@ -91,7 +94,9 @@ def not_finite_near(system: System, x: Array) -> str:
 
 
 def _advice(found: str) -> str:
-    """Return what to write where a function has no finite value or derivative."""
+    """Return what to write where a function has no finite value or derivative, or raises an error."""
+    if " raises " in found:
+        return "let the function have values there, too"
     other = "write it in another way, as abs(z) for sqrt(z**2)"
     return other if "derivative" in found else "write its limit, as np.where(abs(z) > 1e-3, quotient, series)"
 
@@ -274,12 +279,14 @@ def _beside(system: System, x: Array) -> Iterator[Array]:
 
 
 def _is_plain(system: System) -> bool:
-    """Return whether the problem is a boundary value problem and no special kind of it."""
-    return type(system.problem) is BoundaryValueProblem
+    """Return whether the problem is a boundary value problem, in segments or not, and no special kind of it."""
+    return type(system.problem) in (BoundaryValueProblem, SegmentedProblem)
 
 
 def dependence(system: System, x: Array) -> str:
     """Return which conditions of a boundary value problem follow from others or contradict them, as a sentence; or ""."""
+    if isinstance(system.problem, (CycleProblem, ConnectionProblem)):
+        return _of_orbit(system, x)
     rank = _rank(system, x) if _is_plain(system) else None
     if rank is None:
         return ""
@@ -291,6 +298,40 @@ def dependence(system: System, x: Array) -> str:
     if not rank.null.size or (solved and not _are_many(system, z, rank)):
         return ""
     return _jumping(system, rank) or _conditions(system, z, rank, solved)
+
+
+def _of_orbit(system: System, x: Array) -> str:
+    """Return why a cycle or connecting orbit near x is not determined, as a sentence; or ""."""
+    idle = [name for name in system.free if not system.parameter_columns(x, (name,)).any()]
+    if idle:
+        return f"free: {checks.listed(idle)} changes nothing in the equations: free a parameter that the orbit depends on"
+    rank = _rank(system, x)
+    if rank is None:
+        return ""
+    z = _nearest(system, x, rank._replace(null=np.union1d(rank.null, len(rank.left) - 1)))
+    rank = _rank(system, z) if np.isfinite(z).all() and _is_solution(system, z, x) else None
+    if rank is None or not _are_many(system, z, rank):
+        return ""
+    try:
+        system.check_solution(z)  # an equilibrium solves the equations of cycles with any period
+    except ConvergenceError:
+        return ""
+    names = [name for name in system.problem.parameters if name not in system.free]
+    breaking = _acting(system, z, rank.left[rank.null], names)
+    which = f'free "{breaking[0]}", which breaks it,' if breaking else "free a parameter that breaks it, as a damping does,"
+    return (
+        "free: the orbit is one of a family at the same parameters, as where a quantity is conserved: "
+        f"{which} in place of {system.free[0]}"
+    )
+
+
+def _acting(system: System, x: Array, left: Array, names: Sequence[str]) -> list[str]:
+    """Return which parameters enter combinations ``left`` (k, equations) of the equations."""
+    if not names:
+        return []
+    columns = system.parameter_columns(x, names)
+    acting = np.any(np.abs(left @ columns) > LOCATED * (np.abs(left) @ np.abs(columns)), axis=0).tolist()
+    return [name for name, acts in zip(names, acting) if acts]
 
 
 def _jumping(system: System, rank: _Rank) -> str:
@@ -326,9 +367,7 @@ def _conditions(system: System, z: Array, rank: _Rank, solved: bool) -> str:
     if solved:
         return f"boundary: {extra} follow{verb} from the others and the equations, and {free_ones}: put {held} in {their} place"
     others = [name for name in problem.parameters if name not in system.free]
-    columns = system.parameter_columns(z, others)
-    changing = np.any(np.abs(left @ columns) > LOCATED * (np.abs(left) @ np.abs(columns)), axis=0).tolist()
-    freed = [name for name, may in zip(others, changing) if may][: len(ends)]
+    freed = _acting(system, z, left, others)[: len(ends)]
     advice = f", or add it and free {checks.listed(freed)}" if len(freed) == len(ends) == 1 else ""
     return (
         f"boundary: {extra} contradict{verb} the others and the equations, so there is no solution at these parameters, and "

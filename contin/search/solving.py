@@ -227,6 +227,7 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
         if others:
             return correct_away(system, x, others, newton)
         done = correct(system, x, newton=newton, sizes=system.magnitudes)
+        system.check_solution(done.x)
         return looked_at(system, done) if explains else done
     except ConvergenceError as error:
         if not others and (found := recovered(system, x, newton, explains)):

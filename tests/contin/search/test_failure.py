@@ -5,7 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, MapProblem, ProblemError, solve, trace
+from contin import (
+    AlgebraicProblem,
+    BoundaryValueProblem,
+    ConnectionProblem,
+    ConvergenceError,
+    CycleProblem,
+    MapProblem,
+    ProblemError,
+    Segment,
+    SegmentedProblem,
+    solve,
+    trace,
+)  # fmt: skip
 from contin.functions import round_off
 
 
@@ -206,6 +218,72 @@ def test_a_time_that_is_least():
     fastest = BoundaryValueProblem(rhs, ends, ["x", "v", "l1", "l2"], {"T": 1.5})
     text = message(fastest, lambda t: (t, 0, -1, -0.8 + 1.6 * t), free=["T"])
     assert "l2 acts by a jump only (np.sign(u.l2)" in text and "tanh(z / eps) for sign(z)" in text
+
+
+def test_segments_have_the_same_causes():
+    """Two layers without a flux at the ends; with heat made in one, u = s^2 / 2 from 0 to s = 1 / 4. A jump in one of two."""
+
+    def layers(source, first, last):
+        def rhs(s, u, p):
+            return u.slope, source
+
+        parts = [Segment(rhs, ["heat", "slope"], length=0.25), Segment(lambda s, u, p: (u.slope, 0.0), ["heat", "slope"])]
+        joint = lambda a, b, p: (first(a), b[0].heat - a[1].heat, b[0].slope - a[1].slope, last(a, b))  # noqa: E731
+        return SegmentedProblem(parts, joint, {})
+
+    text = message(layers(0.0, lambda a: a[0].slope, lambda a, b: b[1].slope), [0.0] * 4)
+    assert "boundary condition 4 follows from the others" in text and "put a condition on heat_0 at the first end" in text
+    text = message(layers(0.0, lambda a: a[0].slope, lambda a, b: b[0].heat - a[1].heat), [0.0] * 4)
+    assert "boundary condition 4 follows from the others" in text
+    found = solve(layers(1.0, lambda a: a[0].slope, lambda a, b: a[0].heat), [0.0] * 4)
+    assert found.segment(1)["heat"][-1] == pytest.approx(0.25**2 / 2 + 0.25, abs=1e-12)
+
+    jumps = Segment(lambda s, u, p: (u.v, -1.0 if u.l > 0 else 1.0, 0.0), ["x", "v", "l"])
+    rests = Segment(lambda s, u, p: (u.v, 0.0), ["x", "v"])
+    problem = SegmentedProblem(
+        [jumps, rests], lambda a, b, p: (a[0].x, a[0].v, b[0].x - a[1].x, b[0].v - a[1].v, b[1].x - 0.2), {}
+    )
+    assert "l acts by a jump only (u.l > 0, line " in message(problem, [0, 0, 0.1, 0, 0])
+
+
+def test_a_family_of_cycles():
+    """A pendulum: the advice leads to a cycle. One of no size is none."""
+    swing = lambda u, p: (u.v, -math.sin(u.x) - p.damping * u.v)  # noqa: E731
+    problem = CycleProblem(swing, ["x", "v"], {"damping": 0.0})
+    guess = lambda t: (math.cos(2 * math.pi * t), -math.sin(2 * math.pi * t))  # noqa: E731
+    text = message(problem, guess, {"period": 6.7})
+    assert "one of a family at the same parameters" in text and 'free "damping", which breaks it, in place of period' in text
+    found = solve(problem, guess, {"period": 6.7}, free=["damping"])
+    assert abs(found["damping"]) < 1e-12 and found["period"] == 6.7 and found["max_x"] > 0.9
+    assert "one of a family" in message(problem, guess, {"period": 6.3})  # where Newton's method leads to an equilibrium
+
+    def spiral(u, p):
+        return p.m * u.x - u.y - u.x * (u.x**2 + u.y**2), u.x + p.m * u.y - u.y * (u.x**2 + u.y**2)
+
+    decaying = CycleProblem(spiral, ["x", "y"], {"m": -0.1})
+    circle = lambda t: (0.1 * math.cos(2 * math.pi * t), 0.1 * math.sin(2 * math.pi * t))  # noqa: E731
+    text = message(decaying, circle, {"period": 6.3}, error=ConvergenceError)
+    assert "the guess leads to the equilibrium x = " in text and "a larger one" in text
+
+
+def test_a_front_whose_speed_does_not_enter():
+    """The free parameter is named; where the field is not finite at the equilibrium, the operation and its line are."""
+
+    def front(field):
+        return ConnectionProblem(field, ["u", "v"], {"a": 0.25, "c": 0.3}, unstable=1, stable=1)
+
+    def guess(t):
+        s = math.tanh(20 * (t - 0.5) / math.sqrt(8))
+        return (1 + s) / 2, (1 - s**2) / math.sqrt(32)
+
+    def force(u, p):
+        return u.u * (1 - u.u) * (u.u - p.a)
+
+    given = guess, {"time": 40, "to_u": 1}
+    assert "free: c changes nothing" in message(front(lambda u, p: (u.v, 0.3 * u.v - force(u, p))), *given, free=["c"])
+    rough = front(lambda u, p: (u.v, p.c * u.v - force(u, p) * np.sqrt(u.u)))
+    text = message(rough, *given, free=["c"], error=ConvergenceError)
+    assert "sqrt(0) has no finite derivative at u = 0" in text and "(np.sqrt(u.u), line " in text
 
 
 # --- outside of the domain -----------------------------------------------------------------------------------------------
