@@ -55,17 +55,18 @@ def downhill(network: Network, point: Point) -> list:
     way = descent.descend(chain, longest=descent.LONGEST / network.longest)
     if not way.rests:
         raise ValueError("the network of segments does not come to rest")
-    return [functools.partial(_at, piece) for piece in way.end.pieces]
+    return [functools.partial(_at, piece.segment, _states(piece)) for piece in way.end.pieces]
 
 
-def _at(piece: Piece, s: float) -> np.ndarray:
-    """Return quaternion and place (7,) of a strip of segments at a distance from its beginning, on straight lines."""
-    place = s / piece.segment
-    number = min(int(place), len(piece.strains) - 1)
-    part, both = place - number, slice(number, number + 2)
-    q = quaternions(piece.axes[both].swapaxes(1, 2))
-    q[1] *= np.sign(q[0] @ q[1])
-    state = np.hstack([q, piece.place + piece.centreline[both]])
-    state = (1 - part) * state[0] + part * state[1]
+def _states(piece: Piece) -> np.ndarray:
+    """Return quaternions, continuous along the strip, and places (N + 1, 7) of the ends of segments."""
+    return np.hstack([quaternions(piece.axes.swapaxes(1, 2)), piece.place + piece.centreline])
+
+
+def _at(segment: float, states: np.ndarray, s: float) -> np.ndarray:
+    """Return quaternion and place (7,) at a distance from the beginning, on straight lines between ends of segments."""
+    number = min(int(s / segment), len(states) - 2)
+    part = s / segment - number
+    state = (1 - part) * states[number] + part * states[number + 1]
     state[:4] /= np.linalg.norm(state[:4])
     return state
