@@ -544,11 +544,12 @@ class Network:
                 return point, "from the drawing"
         except ContinError as error:
             first = error
+        if is_drawn and (told := self._law_at_drawing or self._undetermined()):
+            raise ProblemError(told) from first
         try:
             drawn = self.state_near(guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
         except ContinError as error:
-            singular = is_drawn and isinstance(error, ConvergenceError)  # the drawing is a solution: what fails is the matrix
-            raise ProblemError(self._mechanism() if singular else self._reason(error)) from first
+            raise ProblemError(self._reason(error)) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
             told = f": {self._reason(first)}" if first else ""
@@ -592,18 +593,28 @@ class Network:
                         "draw longer strips, or hold less"
                     )
 
-    def _mechanism(self, point: Point | None = None) -> str:
-        """Return which strips move without a change of energy in a state, by default in the drawing without stress."""
-        problem = self.problem
-        values = {**problem.parameters, **self.parameters, ASSEMBLY: 0.0}
+    def _undetermined(self) -> str:
+        """Return what nothing determines in the drawing without stress, where no load acts; '' where all is."""
+        other, problem = self, self.problem
         if not problem.has_index:
+            loads = {name: replace(load, followers=()) for name, load in self.loads.items()}
+            other = replace(self, loads=loads, numbers={name: x for name, x in self.numbers.items() if name != FOLLOWER})
+            problem = other.problem
+        values = {**problem.parameters, **other.parameters, ASSEMBLY: 0.0}
+        system = problem.discretized(problem.multipliers, values, None, np.linspace(0, 1, 11), 4)
+        states = np.zeros((len(system.nodes), len(problem.state_names)))
+        for member, places in zip(self.members.values(), other.places):
+            states[:, places[:7]] = member.drawn(member.length * system.nodes)
+        drawing = point_of(system, system.pack(states, values))
+        try:
+            return "" if drawing.second_variation().is_determined else other._mechanism(drawing)
+        except ProblemError as error:
+            return UNDETERMINED if Undetermined.CONDITIONS in str(error) else ""
+
+    def _mechanism(self, point: Point) -> str:
+        """Return which strips move without a change of energy in a state."""
+        if not self.problem.has_index:
             return f"joints: the network {MECHANISM}"
-        if point is None:
-            system = problem.discretized(problem.multipliers, values, None, np.linspace(0, 1, 11), 4)
-            states = np.zeros((len(system.nodes), len(problem.state_names)))
-            for member, places in zip(self.members.values(), self.places):
-                states[:, places[:7]] = member.drawn(member.length * system.nodes)
-            point = point_of(system, system.pack(states, values))
         variation = point.second_variation()
         sizes, free = np.abs(variation.eigenvalues), self._free_turns
         count = max(1, int(np.count_nonzero(sizes < levels.LOCATED * sizes.max())))
@@ -717,14 +728,18 @@ class Network:
             raise ProblemError(self._mechanism(point))
         return point
 
-    def _reason(self, error: ContinError) -> str:
-        """Return why no state was found, in the words of networks."""
+    @property
+    def _law_at_drawing(self) -> str:
+        """Return that a law has no value at the drawing; '' where all have."""
         t = np.linspace(0, 1, 101)
         for name, member in self.members.items():
             if told := law_end.at_guess(self.sections[member.section], t, member.drawn(member.length * t)[:, :4]):
                 return f"strips: {name.partition(' ')[0]}: {told}"
-        text = str(error)
-        return self._mechanism() if Undetermined.MODE in text else UNDETERMINED if Undetermined.CONDITIONS in text else text
+        return ""
+
+    def _reason(self, error: ContinError) -> str:
+        """Return why no state was found, in the words of networks."""
+        return self._law_at_drawing or (UNDETERMINED if Undetermined.CONDITIONS in str(error) else str(error))
 
     @property
     def _sizes(self) -> dict[str, float]:
