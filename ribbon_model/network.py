@@ -29,7 +29,6 @@ import numpy as np
 
 from contin import (
     ContinError,
-    ConvergenceError,
     Event,
     MeshControl,
     Point,
@@ -616,13 +615,12 @@ class Network:
         if not self.problem.has_index:
             return f"joints: the network {MECHANISM}"
         variation = point.second_variation()
-        sizes, free = np.abs(variation.eigenvalues), self._free_turns
+        sizes = np.abs(variation.eigenvalues)
         count = max(1, int(np.count_nonzero(sizes < levels.LOCATED * sizes.max())))
-        idle = [name for name in (*self.loads, "field") if name in self.numbers or name in self.loads]
-        if self.floats and idle and not any(point.parameters[name] for name in idle) and count == 3 - len(free):
+        if self.is_idle and count == 3 - len(self._free_turns):
             return (
-                f"loads: a network that floats is turned by its loads, and {' = '.join(idle)} = 0 does not determine how; "
-                f"begin with another value, as in numbers: {{{idle[0]}: {self._sizes['sigma'] / 1000:.1g}}}"
+                f"loads: a network that floats is turned by its loads, and {' = '.join(self.turning)} = 0 does not determine "
+                f"how; begin with another value, as in numbers: {{{self.turning[0]}: {self.force / 1000:.1g}}}"
             )
         modes = variation.modes(count, np.linspace(0, 1, 21))[:, :, [places[:7] for places in self.places]]
         moved = np.abs(modes / ([1.0] * 4 + [self.longest] * 3)).max(axis=(0, 1, 3))
@@ -630,9 +628,39 @@ class Network:
         return f"joints: {', '.join(names)} {MECHANISM}"
 
     @property
+    def turning(self) -> list[str]:
+        """The numbers of loads that turn a network that floats."""
+        return [name for name in (*self.loads, "field") if name in self.numbers or name in self.loads]
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether a network floats, and all that turns it is zero."""
+        return self.floats and bool(self.turning) and not any(self.parameters[name] for name in self.turning)
+
+    def lever(self, point: Point, name: str) -> np.ndarray:
+        """Return the sum of f x^T (3, 3) over the forces f of a load, for a number of 1, at their places x in a state.
+
+        Of a field, along which directors are turned, the integral over these.
+        """
+        if name in self.loads:
+            at = [(where, np.array(f), self.joints[where].members[0], arm) for where, f, arm in self.loads[name].forces]
+            return sum(np.outer(f, self.place(point, where) + self._arm(point, one, arm)) for where, f, one, arm in at)
+        lengths = [member.length for member in self.members.values()]
+        axes = [shape.directors[:, self.magnetized].mean(axis=0) for shape in self.shapes(point).values()]
+        return np.outer(self.field_direction, np.average(axes, axis=0, weights=lengths) * sum(lengths))
+
+    @property
+    def force(self) -> float:
+        """The size of forces: the smallest stiffness over the square of the length of the longest strip."""
+        return self._sizes["sigma"]
+
+    @property
     def longest(self) -> float:
-        """The length of the longest member."""
-        return max(member.length for member in self.members.values())
+        """The length of the longest strip, with all of its pieces."""
+        lengths: Counter[str] = Counter()
+        for name, member in self.members.items():
+            lengths[name.partition(" ")[0]] += member.length
+        return max(lengths.values())
 
     @property
     def gaps(self) -> dict[str, float]:
@@ -745,7 +773,7 @@ class Network:
     def _sizes(self) -> dict[str, float]:
         """Sizes of states and numbers: what is small in a first state, or round-off, is not small by its nature.
 
-        Places have the size of the longest member L, forces and moments B/L^2 and B/L with the smallest stiffness B.
+        Places have the size of the longest strip L, forces and moments B/L^2 and B/L with the smallest stiffness B.
         """
         stiffness = [
             self.parameters[self.full_name(name, number)]

@@ -38,8 +38,9 @@ class NetworkStage(OpenStage):
         mesh = self.scene.mesh
         try:
             point, self._how = first_state(
-                self.strip, mesh.intervals, mesh.degree, mesh=self.mesh_control(), newton=newton_of(self.scene)
-            )
+                self.strip, mesh.intervals, mesh.degree, {self.follow: self.stage.to},
+                mesh=self.mesh_control(), newton=newton_of(self.scene),
+            )  # fmt: skip
         except (ContinError, ValueError) as error:
             raise ConfigError(f"strips: no first state was found from the drawing: {error}") from error
         return point

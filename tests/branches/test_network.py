@@ -21,9 +21,10 @@ from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.network import column
 from branches.scene.parse import dump, load, parse
-from contin import trace
+from contin import ContinError, trace
 from ribbon_model.descent import past
 from ribbon_model.network import START
+from ribbon_model.network_first import first_state
 from tests.ribbon_model.test_network_independent import Shooting
 
 ROD = "{law: rod, B1: 1.0, B2: 1.0, C: 0.75}"
@@ -682,18 +683,31 @@ def _portal(law=_STIFF, L=1.0, up=0.0, C=_JOINED, D="clamped", to=0.1):
             "joints: right can move, or turn about itself, without a change of energy",
         ),
         (_portal("ribbon, nu: 0.3"), "strips: left: the law 'ribbon' has no value where the bending vanishes"),
-        (
-            f"material: {{law: {_STIFF}}}\nstrips: {{a: {{begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}}}\n"
-            "joints: {A: [a start], B: [a finish]}\nloads: {P: {A: [0, 0, -1], B: [0, 0, 1]}}\n"
-            "stages:\n  - {follow: P, to: 1.0}\n",
-            "P = 0 does not determine how; begin with another value, as in numbers: {P: 0.0008}",
-        ),
     ],
 )
 def test_why_there_is_no_first_state(text, sentence, tmp_path):
     with pytest.raises(ConfigError, match=re.escape(sentence)):
         run_scene(parse(text, "scene.yaml"), tmp_path / "result.h5", Display(silent=True))
     assert not (tmp_path / "result.h5").exists()
+
+
+@pytest.mark.parametrize("end", ["[0, 0, 1]", "[0.5, 0.3, 1]"])
+def test_a_strut_that_floats_begins_where_its_forces_grow(end):
+    """It turns into the line of the forces, and buckles at (pi/L)^2 B1 as with hinged ends; two turns lower its energy."""
+    scene = parse(
+        f"material: {{law: {_STIFF}}}\nstrips: {{a: {{begin: [0, 0, 0], end: {end}, normal: [0, 1, 0]}}}}\n"
+        "joints: {A: [a start], B: [a finish]}\nloads: {P: {A: [0, 0, 1], B: [0, 0, -1]}}\n"
+        "stages:\n  - {follow: P, to: 10}\n",
+        "scene.yaml",
+    )
+    strut, load = scene.strip(), math.pi**2 / scene.longest**2
+    point, how = first_state(strut, grows={"P": 10})
+    assert 0 < point["P"] < 1e-5 and "at 0 nothing determines how" in how
+    branch = trace(point, free=["P"], limits={"P": (0, 1.05 * load)}, progress=False)
+    assert [(one["P"], one.index_change) for one in branch.labelled("BP")] == [(pytest.approx(load, rel=1e-9), (2, 3))]
+    np.testing.assert_allclose(strut.place(branch[-1], "B"), [0, 0, scene.longest], atol=1e-9)
+    with pytest.raises(ContinError, match=re.escape("P = 0 does not determine how; begin with another value")):
+        strut.first_point()
 
 
 def test_a_gap_that_was_closed_is_said(tmp_path, capsys):
