@@ -48,7 +48,7 @@ def pytest_configure(config):
         pass
     else:
         common = {"deadline": None, "derandomize": True, "suppress_health_check": list(HealthCheck)}
-        settings.register_profile("quick", max_examples=60, **common)
+        settings.register_profile("quick", max_examples=25, **common)
         settings.register_profile("full", max_examples=300, **common)
         settings.load_profile("full" if config.getoption("--full") else "quick")
 
@@ -65,7 +65,7 @@ def pytest_xdist_auto_num_workers(config):
 REQUIRED = {"posix": os.name == "posix", "forks": sys.platform.startswith("linux")}
 
 
-def _left_out(items):
+def _long(items):
     """Return the tests that take long: those marked so and, of one marked ``sample(n)``, all but n of its parameters."""
     groups = {}
     for item in items:
@@ -84,14 +84,16 @@ def pytest_collection_modifyitems(config, items):
             if mark is not None:
                 item.add_marker(pytest.mark.skip(reason=f"needs {name}: {mark.args[0]}"))
     part, parts = map(int, (config.getoption("--part") or "0/1").split("/"))
-    for item in list(_left_out(items)):
+    asked = config.getoption("--full") or any("::" in argument for argument in config.args)  # or by their names
+    left = set()
+    for item in list(_long(items)):
         item.add_marker(pytest.mark.full)
-        if not config.getoption("--full"):
-            item.add_marker(pytest.mark.skip(reason="takes long: with --full only"))
-        elif parts > 1 and item.get_closest_marker("hours"):
-            item.add_marker(pytest.mark.skip(reason="takes longer than a part of the tests may"))
-        elif zlib.crc32(item.nodeid.encode()) % parts != part:
-            item.add_marker(pytest.mark.skip(reason="takes long, and belongs to another part of those that do"))
+        hours = parts > 1 and item.get_closest_marker("hours")
+        if not asked or hours or zlib.crc32(item.nodeid.encode()) % parts != part:
+            left.add(item)
+    if left:
+        config.hook.pytest_deselected(items=list(left))
+        items[:] = [item for item in items if item not in left]
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
     assert all(path.exists() for path in places), "FIRST names a module that is not there"
     items.sort(key=lambda item: places.get(item.path, len(places)))

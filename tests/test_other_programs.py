@@ -31,6 +31,7 @@ def run(code, scope):
     return said.getvalue()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("page", ["from-auto.md", "from-xppaut.md"])
 def test_contin_prints_what_the_page_shows(page):
     found, scope = blocks(page), {}
@@ -41,6 +42,7 @@ def test_contin_prints_what_the_page_shows(page):
         assert same(said, shown, CONTIN), said
 
 
+@pytest.mark.full
 @pytest.mark.skipif(
     not shutil.which("auto-07p") or not shutil.which("gfortran"), reason="needs AUTO-07p: apt-get install auto-07p gfortran"
 )

@@ -142,6 +142,7 @@ def objects(tmp_path_factory):
     return reached([*made, *of_strips(folder), lowlevel.read_columns(stored), *autos])
 
 
+@pytest.mark.full
 def test_everything_is_printed_on_a_screen_and_without_addresses(objects):
     kinds = {type(thing) for thing in objects}
     wrong = {f"{kind.__module__}.{kind.__qualname__}": set() for kind in kinds}

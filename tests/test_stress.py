@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SCRIPT = Path(__file__).parent.parent / "scripts" / "stress.py"
 
 
@@ -18,6 +20,7 @@ def test_some_problems(request):
     assert f"{count} problems, " in done.stdout and "0 problems with faults" in done.stdout
 
 
+@pytest.mark.full
 def test_two_branch_points_in_a_step_that_begins_beside_the_first():
     """Problem 53: one singular value is smaller than the others by far, and two pass zero one after the other."""
     done = stress("--count", "1", "--first", "53", "--verbose")

@@ -34,7 +34,7 @@ def test_help_lists_all_and_imports_nothing_heavy(command):
     assert said.endswith("False False\n")
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("words", ["run none.yaml", "paper --out p nix", "export x.h5", "strip --width x"])
 def test_a_command_does_the_same_as_its_module(command, words):
     name, *rest = words.split()
@@ -53,6 +53,7 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
+@pytest.mark.full
 def test_a_mistake_is_answered_with_what_to_type(command):
     said = command("run", "m1_n2", "nu=0.2", program=PROGRAM).err
     assert said.startswith("error: unrecognized arguments: nu=0.2; a field of a scene is changed by --set KEY=VALUE")
@@ -108,13 +109,14 @@ def test_help_of_every_command_names_it(name, prefix, monkeypatch):
     assert parser.format_help().startswith(f"usage: {prefix}{name} ")
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", cli.COMMANDS)
 def test_help_names_the_command_that_was_typed(command, name):
     assert command(name, "--help", program=PROGRAM).out.startswith(f"usage: ribbon {name} ")
     assert command("--help", program=("-m", f"branches.{name}")).out.startswith(f"usage: python -m branches.{name} ")
 
 
+@pytest.mark.full
 def test_scenes_of_the_package_are_listed_and_run_by_name(command, call, root, monkeypatch):
     monkeypatch.setattr("branches.store.command.prefix", "ribbon ")  # which the program sets, for the rest of its process
     listed = call(cli.main, "scenes").out

@@ -365,6 +365,7 @@ def test_no_more_processes_than_cores_that_were_granted(monkeypatch, variables, 
     assert executors.cores() == expected
 
 
+@pytest.mark.full
 def test_a_scheduler_that_is_not_there():
     pytest.importorskip("distributed", reason="Dask is not installed")
     with pytest.raises(ExecutorError, match="no Dask scheduler answers"), executor("nowhere://x"):
@@ -443,6 +444,7 @@ def test_values_that_agree_in_six_digits_are_two_branches(close, capsys):
     assert "2 of them computed before" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_pictures_and_pages_of_close_values_have_titles_of_their_own(close):
     graph = read(close)
     titles = {draw_diagram.figure(graph, "ribbon", nu, disentangle=False).get_suptitle() for nu in (0.3, 0.3000001)}
@@ -456,6 +458,7 @@ def test_what_is_absent_is_named_exactly():
     assert list(scene.absent) == ["ribbon, nu = -0.9, (1, 2)", "ribbon, nu = -0.9000001, (1, 2)"]
 
 
+@pytest.mark.full
 @pytest.mark.posix("Windows sends Ctrl-C in another way")
 def test_an_interrupted_diagram_leaves_no_process_and_goes_on(command, tmp_path):
     """Ctrl-C: workers hold the other end of standard output, so it ends only when they are gone; the rest is computed later."""
@@ -489,6 +492,7 @@ def test_the_preview_is_the_diagram(folder):
     assert here == pytest.approx(there, abs=1e-3)  # between points both are splines, the preview's through fewer
 
 
+@pytest.mark.full
 def test_disentangled_lines_cross_less_and_keep_kappa_n(folder):
     graph, window = read(folder), (-8.0, 14.0)
     lines = draw_diagram.lines(graph, "ribbon", 0.3)
@@ -511,6 +515,7 @@ def test_crossings_of_polylines():
     assert crossings([zigzag, low], (1.0, 3.0)) == 2  # the first is outside
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("source", ["diagram", "scene"])
 def test_the_pictures(folder, call, tmp_path, source):
     (tmp_path / "scene.yaml").write_text(SCENE)
@@ -523,6 +528,7 @@ def test_the_pictures(folder, call, tmp_path, source):
     assert refused.returncode == 2 and "must end in .pdf, .svg or .png" in refused.err
 
 
+@pytest.mark.full
 def test_the_work_for_a_branch_does_not_grow_with_the_diagram(tmp_path, monkeypatch):
     """Calls of functions in the process that collects the branches, each with its line, for one of 60 and for one of 240."""
 

@@ -31,7 +31,7 @@ def difference(point):
     return (np.abs(mine - theirs) / (1 + np.abs(mine))).max()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", SCENES)
 def test_every_accepted_point_is_as_exact_as_its_mesh_should_be(name):
     scene, _ = SCENES[name]
@@ -44,6 +44,7 @@ def test_every_accepted_point_is_as_exact_as_its_mesh_should_be(name):
         assert difference(point) < 5e-11
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["a ribbon", "a wide strip"])
 def test_the_same_errors_are_stated_where_the_mesh_is_kept(name):
     """Without adaptation the errors are large; what is stated is not less than a fifth of them, where they are 1e-3."""

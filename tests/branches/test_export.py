@@ -51,6 +51,7 @@ DISCRETIZED = 1e-4
 # --- solids and surfaces ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("ending", ["stl", "obj"])
 def test_a_solid_is_closed_and_has_the_volume_of_the_strip(write, ending):
     trimesh, meshio = pytest.importorskip("trimesh"), pytest.importorskip("meshio")
@@ -237,6 +238,7 @@ def test_of_several_points_with_a_label_one_is_to_be_named(call, results, tmp_pa
     assert "2 points have this label; name one by its number: 2 (LP at" in done.err and done.returncode == 2
 
 
+@pytest.mark.full
 @pytest.mark.posix("Windows sends Ctrl-C in another way")
 def test_ctrl_c_ends_in_one_line_and_leaves_nothing(command, results, tmp_path):
     process = command.start(results, "--movie", "x.gif", program=("-m", "branches.export"))

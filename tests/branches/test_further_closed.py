@@ -71,6 +71,7 @@ def test_a_state_of_a_secondary_branch():
     on_the_loop(solution)
 
 
+@pytest.mark.full
 def test_even_circles_have_states_of_their_own():
     points = list(further(FLAT_ROD, {"nu": 0.3}, 0.0, [], [2], 8))
     assert points and not any(is_odd(Solution.of(point)) for point in points)

@@ -138,6 +138,7 @@ def test_states_that_no_run_was_in(good, tmp_path, silent, change):
     assert path.read_bytes() == before
 
 
+@pytest.mark.full
 def test_bits_that_turn_on_disk_are_noticed(good, tmp_path):
     """One byte in a hundred files each: what is still read is what was written."""
     image, chance, seen = good.read_bytes(), random.Random(5), 0

@@ -51,7 +51,7 @@ def interrupted(process, module: str, delay: float) -> list[str]:
     return [*rest, *(line for line in err.splitlines() if not line.startswith("import time:"))]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.posix("Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize("moment", ["importing", "computing"])
 @pytest.mark.parametrize("name", COMMANDS)

@@ -297,6 +297,7 @@ def test_what_a_file_holds(run, tmp_path):
     assert sum(len(part.arclength) - 1 for part in placed.parts) >= 100
 
 
+@pytest.mark.full
 def test_a_run_that_is_interrupted_goes_on(root, tmp_path, monkeypatch, shipped):
     """Interrupted in its second stage and resumed, a scene gives the points of a run in one go, up to their errors."""
     import branches.run.runner as runner

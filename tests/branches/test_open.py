@@ -167,6 +167,7 @@ def test_the_ribbon_ends_where_its_bending_vanishes(tmp_path):
         assert "the law 'finite width' goes on" in read_branch(path).stop
 
 
+@pytest.mark.full
 def test_a_film_of_an_open_strip(tip, tmp_path):
     assert export.main([str(tip), "--movie", str(tmp_path / "tip.gif"), "--frames", "3"]) == 0
     assert (tmp_path / "tip.gif").read_bytes().startswith(b"GIF89a")
@@ -214,6 +215,7 @@ def test_interrupted_and_run_again(tip, root, tmp_path, tables):
     assert tables(path) == tables(tip)
 
 
+@pytest.mark.full
 def test_a_scene_with_further_stages_goes_on(tip, root, tmp_path, tables):
     """The file of the first stage alone becomes that of both."""
     both, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
@@ -382,6 +384,7 @@ def test_notes_of_stages(tmp_path, capsys):
 # --- sizes of states and numbers ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("B2", [1.0001, 1.001, 1.01])
 def test_a_strip_whose_components_are_small_at_first(B2, tmp_path):
     """A rod that is nearly isotropic: half a twist leaves the circle plane but for (B2 - 1)**2, which is no size of its place.
@@ -401,6 +404,7 @@ def test_a_strip_whose_components_are_small_at_first(B2, tmp_path):
     assert last["energy"] == pytest.approx(37.24952826, abs=1e-8) and last["error_energy"] < 1e-10
 
 
+@pytest.mark.full
 def test_a_stage_that_begins_at_round_off(tmp_path, capsys):
     """A weight that was taken to zero and is 1e-29 there: the next stage goes on as from zero, and zero is what is printed."""
     text = (

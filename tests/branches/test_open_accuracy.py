@@ -33,6 +33,7 @@ def followed(text, tmp_path, settings=()):
 ARCH = "material: {law: flat rod, nu: 0.3}\nnumbers: {distance: 0.95}\nbegin: arch\n"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("stages", "sentence"),
     [
@@ -91,6 +92,7 @@ def test_a_curve_in_two_parameters_that_starts_outside_its_limits_is_refused():
 # --- dimensions ---------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("law", "modulus"),
     [("flat rod", 200e9 * 0.01 * 0.0005**3 / 12), ("ribbon", 200e9 * 0.01 * 0.0005**3 / 12 / (1 - 0.09)), ("", None)],

@@ -68,6 +68,7 @@ def test_a_limit_is_said_to_be_the_scenes(tmp_path):
     assert axes.get_title().startswith("flat rod,") and same_color(axes.lines[0].get_color(), colour_of(1))
 
 
+@pytest.mark.full
 def test_the_script_says_which_family_it_draws(tmp_path, call):
     scene = parse("{m: 1, n: 2, nu: [0.3, 0.31], limits: {kappa_n: [0, 20]}, stride: 50}", "scene")
     run_many(scene, tmp_path / "two", Display(silent=True))
@@ -184,6 +185,7 @@ def test_a_film_shows_the_graph_of_the_stage(stroke):
     assert np.array_equal(first, again) and not np.array_equal(first, last)
 
 
+@pytest.mark.full
 def test_texts_hide_no_marks_and_no_other_texts(root, tmp_path):
     branch = branch_of(tmp_path, load(root / "configs" / "open_clamped.yaml"))
     picture = figure(branch)
@@ -290,6 +292,7 @@ def test_the_inset_shows_the_five_bifurcations_that_are_one_blob(pictures):
     assert min(np.diff(pixel)) > 15  # in the panel they are 1 to 5 pixels apart
 
 
+@pytest.mark.full
 def test_lines_do_not_touch_what_they_do_not_meet(previews):
     """At the ends of (3, 4) and (5, 6), (1.79, 5) and (7.44, 5), and beside the circle of (1, 7): by 0.1."""
     found = lines(previews["ribbon"], "ribbon", 0.3)
@@ -374,6 +377,7 @@ def test_the_picture_of_a_circle_has_no_seams_and_its_near_side_in_front(tmp_pat
     assert shade(covered[4]) == pytest.approx(far, abs=1e-3) and shade(covered[-5]) == pytest.approx(near, abs=1e-3)
 
 
+@pytest.mark.full
 def test_frames_of_a_film_are_as_far_apart_as_the_points_allow(tmp_path):
     branch = branch_of(tmp_path, "{m: 1, n: 2, steps: {largest: 0.05}}")
     strips = draw_strip.steady({point: branch.placed(point, 2 * math.pi)[0] for point in branch.kept().tolist()})

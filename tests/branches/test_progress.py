@@ -165,6 +165,7 @@ def shown_on_a_terminal(command, *arguments, program, **more):
     return lines(shown.decode())
 
 
+@pytest.mark.full
 def test_no_call_of_contin_shows_a_line_of_its_own():
     """A command has one line of progress, and none if it is quiet: calls within it say so (or pass on what they are given)."""
     packages = [Path(package.__file__).parent for package in (branches, ribbon_model)]

@@ -75,6 +75,7 @@ def test_zeros_that_agree_in_six_digits_have_names_of_their_own(tmp_path, capsys
 # --- the main job ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_main_job(command, root):
     """From an unrelated folder, with a result whose name has a space and letters beyond ASCII."""
     done = command(root / "configs" / "m1_n2.yaml", "--out", "a folder/résultat 1.h5")
@@ -257,6 +258,7 @@ def test_a_disk_that_is_read_only(call, scene, disk):
 # --- interrupted, and gone on with ------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tables):
     """Ctrl-C after each point in turn, labelled ones too; the columns are in the end bit by bit those of one run."""
     path, config, outcome, stops = tmp_path / "x.h5", scene_of(), "", 0
@@ -270,6 +272,7 @@ def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tabl
     assert stops > 25
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", [0, 7, 18])
 def test_sigterm_does_the_same(tmp_path, silent, undisturbed, tables, number):
     path, config = tmp_path / "x.h5", scene_of()
@@ -359,6 +362,7 @@ def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undistur
     assert sorted(os.listdir(command.folder)) == ["scene.yaml", "x.h5"]
 
 
+@pytest.mark.full
 @pytest.mark.posix("Windows sends Ctrl-C in another way")
 def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
     """While the kernels are being compiled: no traceback, no file."""
@@ -412,6 +416,7 @@ EXTENSIONS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("first, then", EXTENSIONS.values(), ids=EXTENSIONS.keys())
 def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, tables, first, then):
     path = tmp_path / "x.h5"
@@ -442,6 +447,7 @@ def test_a_run_that_cannot_be_extended_so(tmp_path, silent, first, then, said):
 # --- standard output, terminals ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_nobody_reads_the_output_to_its_end(command, scene):
     """As with ``| head -1``: the run goes on quietly, its product is the file."""
     process = command.start(scene)
@@ -461,6 +467,7 @@ def test_output_that_cannot_be_written(command, scene):
     assert done.err == "error: cannot write to standard output: No space left on device\n"
 
 
+@pytest.mark.full
 def test_an_encoding_without_the_letters(command, scene):
     done = command(scene, "--out", "é.h5", "--quiet", env={"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.err) == (0, "") and "written to \\xe9.h5" in done.out

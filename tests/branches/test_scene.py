@@ -108,6 +108,7 @@ class Interrupts(Display):
             signal.raise_signal(signal.SIGINT)
 
 
+@pytest.mark.full
 def test_a_run_goes_on_in_a_stage_with_other_ends_to_the_same_bits(tmp_path, root, tables):
     scene = load(root / "configs" / "open_release.yaml")
     whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
@@ -159,6 +160,7 @@ QUARTIC = Law.of_energy("quartic", quartic, {"twist": Parameter(), "core": Param
 """
 
 
+@pytest.mark.full
 def test_a_law_of_one_s_own_is_a_sweep_a_diagram_and_a_page_of_closed_strips(tmp_path, monkeypatch):
     """It has a length of its own and no nu. (1, 2) leaves the circle where M r0 = t (1 - n^2/m^2) with the moment M there."""
     (tmp_path / "quartic.py").write_text(LAW)
@@ -244,6 +246,7 @@ def test_a_file_with_a_law_that_cannot_be_used(text, said, tmp_path):
     assert str(caught.value).startswith("RIBBON_LAWS: ") and "law.py" in str(caught.value)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["m1_n2", "open_tip"])
 def test_newton_s_tolerance_is_a_field_of_scenes(name, root, tmp_path):
     """A looser one leaves more of Newton's error in plain points, and labelled points are as good as before."""

@@ -26,6 +26,7 @@ def assert_scene_words(text):
     assert not [word for word in FOREIGN if word in text]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("m", "n"), [(1, 2), (1, 3), (3, 1)])
 def test_an_advice_names_a_field_of_the_scene_and_the_run_goes_on_with_it(m, n, tmp_path):
     """Branches cannot be followed with steps of 1; the advised field is set here as the scene's user would."""
@@ -74,6 +75,7 @@ def test_a_reason_of_another_kind_is_kept():
     assert advice.no_state(run, "a = 1") is run.stop
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("scene", "sentence"),
     [

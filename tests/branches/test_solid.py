@@ -76,7 +76,7 @@ def closed(mesh: Mesh) -> bool:
     return len(ahead) == len(edges) and ahead == back and len(np.unique(edges)) == len(mesh.vertices)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", STRIPS)
 def test_a_solid_is_closed_and_has_the_volume_of_its_length_width_and_thickness(name):
     """The volume element is 1 - v omega_2 + z omega_1 + v eta', whose mean over the section is 1 (eta is constant here)."""
@@ -125,7 +125,7 @@ def test_bounding_boxes_of_an_arc_a_loop_and_a_twisted_strip():
     np.testing.assert_allclose(twisted, [math.hypot(WIDTH, THICKNESS)] * 2 + [1], rtol=1e-5)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["straight", "arc", "twisted", "helix of a ribbon"])
 def test_a_width_and_a_thickness_that_vary_along_the_strip_are_those_of_the_solid(name):
     """Volume: the integral of width times thickness; area of a developable surface: that of the width."""
@@ -186,7 +186,7 @@ def result(tmp_path_factory):
     return result
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", VOLUMES)
 def test_a_scene_is_exported_with_its_volume(name, result, tmp_path):
     trimesh = pytest.importorskip("trimesh")
@@ -217,6 +217,7 @@ def test_the_shape_of_a_scene_knows_its_width_along_the_strip(result):
     assert branch.width_at(400, None) == pytest.approx(10)
 
 
+@pytest.mark.full
 def test_Gamma_and_a_thickness_give_the_width_of_an_open_strip(result, tmp_path):
     scene = "material: {law: finite width, nu: 0.3, Gamma: 4.0}\nfinish: free\nstages: [{follow: force_tangent, to: 1}]\n"
     run_scene(parse(scene, "s"), tmp_path / "s.h5", Display(silent=True))

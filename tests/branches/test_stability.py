@@ -147,6 +147,7 @@ def test_a_pair_of_bifurcations_in_one_step(tmp_path):
     assert [(event["index_before"], event["index_after"]) for event in events] == [(6, 5), (5, 4), (4, 5)]
 
 
+@pytest.mark.full
 def test_a_mesh_too_coarse_for_the_index_is_halved(tmp_path):
     """A strip of finite width beyond kappa_n = 14: on the mesh of the run an eigenvalue of 1e-3 has the error 1e-2."""
     scene = "{m: 3, n: 1, law: finite width, Gamma: 3, stability: true, limits: {kappa_n: [-5, 20]}}"

@@ -322,6 +322,7 @@ def test_where_there_are_no_locks_there_is_no_lock(tmp_path, monkeypatch, number
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.full
 def test_two_processes_never_hold_it_both(command, tmp_path):
     """Four processes take it and give it up all the time; each writes a file of its own name while it has it."""
     code = """

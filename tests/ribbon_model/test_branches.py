@@ -92,6 +92,7 @@ def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch
     assert other.points[-1]["kappa_n"] == pytest.approx(-0.5, abs=1e-8)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("m", "n"), [(1, 3), (3, 4), (3, 5), (5, 6), (1, 4)])
 def test_folds_and_ends_against_the_quadrature(m, n):
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 10, 7)
@@ -131,6 +132,7 @@ def test_what_does_not_close_is_refused():
         primary_branch(RIBBON, 2, 1, NU)
 
 
+@pytest.mark.full
 def test_a_secondary_branch_on_the_half_loop():
     """(3, 1) for nu = .3 loses a mode of the half loop twice on its way to -infinity; the branch between has R != 0.
 

@@ -129,6 +129,7 @@ def test_energy_of_a_circle_is_exact(law):
         assert strip.kappa_star == pytest.approx(m, abs=1e-13)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("law", "m", "n", "kappa_n"), [(RIBBON, 1, 2, 3.5), (ISOTROPIC_ROD, 1, 2, 2.0)])
 def test_energy_of_an_equilibrium_converges_to_the_quadrature(law, m, n, kappa_n):
     """At rest with N segments, from above, with the second power of 1/N; the quadrature shares nothing with it."""
@@ -153,6 +154,7 @@ def test_modes_of_circles_count_as_the_linear_theory(law):
 # --- downhill ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("metric", METRICS)
 def test_energy_falls_closed_and_in_its_class(metric):
     """Three loops to one: at every step less energy, closed, a quaternion that comes back to its negative."""
@@ -174,6 +176,7 @@ def test_a_stable_state_stays(law):
     assert (rest.kind, rest.m, rest.stability.index) == ("circle", 1, 0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("metric", METRICS)
 def test_a_single_loop_just_above_its_threshold_buckles(metric):
     """Into (1, 2), which the quadrature knows: energies agree to O(h^2) on the way down, to round-off once solved anew."""
@@ -186,6 +189,7 @@ def test_a_single_loop_just_above_its_threshold_buckles(metric):
     assert 0 < fine < 2e-5 and coarse / fine == pytest.approx(4, abs=0.3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("longest", [0.1, 0.05])
 def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
@@ -195,7 +199,7 @@ def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
     assert (str(rest), rest.stability.index) == ("3-covered circle", 0)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("law", "m", "kappa_n", "expected"),
     [
@@ -219,6 +223,7 @@ def test_what_circles_become_past_their_limits(law, m, kappa_n, expected):
         assert descent.rests and (str(rest), rest.stability.index) == (expected, 0)
 
 
+@pytest.mark.sample(1)
 @LAWS
 def test_the_same_end_wherever_the_kick_begins(law):
     """Equal up to a shift along the strip: the start of the segments has no say."""
@@ -241,6 +246,7 @@ def test_what_is_refused():
         replace(strip, strains=1.3 * strip.strains).moved(np.zeros(96))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("m", "kappa_n", "where"), [(3, -1.0, "1-covered circle"), pytest.param(1, 3.3, "(1, 2)", marks=pytest.mark.full)]
 )

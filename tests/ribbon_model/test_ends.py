@@ -17,6 +17,7 @@ def branch(law, m, n, nu, **options):
     return trace(point_of(system, x), Settings(**SETTINGS, **options), tangent=tangent)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("m", "n", "nu", "kappa_n"),
     [
@@ -61,6 +62,7 @@ def test_no_fold_beside_a_flat_pitchfork(nu, search):
     assert found.points[-1]["kappa_n"] == pytest.approx(exact.end(9, 8, nu, "isotropic rod")[1], abs=1e-11)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "nu"), [(38, 0.37), (60, 0.3)])
 def test_a_circle_is_left_where_the_law_bends_on_a_small_scale(n, nu):
     """kappa_n lies just below m / nu: the ribbon's a = c - nu kappa_n is 6e-4 on the circle of (1, 38)."""

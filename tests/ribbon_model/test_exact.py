@@ -14,6 +14,7 @@ from ribbon_model.exact import bifurcation, curve, end, folds, residuals, solve
 MODES = [(m, n) for m in (1, 3, 5, 7) for n in range(1, 8) if n != m]
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("m, n", MODES)
 @pytest.mark.parametrize("nu", [-0.85, -0.3, 1e-3, 0.3, 0.5])
 def test_bifurcation_is_equation_27(m, n, nu):
@@ -30,6 +31,7 @@ def test_bifurcation_limits():
     assert bifurcation(3, 4, 1e-9) == pytest.approx(bifurcation(3, 4, 0), rel=1e-7)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("m, n", MODES)
 def test_branch_leaves_its_circle(m, n):
     """kappa_n -> m K^{m,n} and kappa* -> m as A -> 0: extrapolated to A = 0 (error O(A^3)), and exact at A = 0."""
@@ -68,6 +70,7 @@ def mp_closure(c, A, kappa_n, m, n, nu):
     return total.real - mpmath.pi / (2 * n), (turns - mpmath.nint(turns)) * mpmath.pi
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("m, n, which", [(1, 2, 0), (1, 3, 1)])
 def test_fold_in_thirty_digits(m, n, which):
     """mpmath: kappa_n at the fold's A and beside it by findroot on the two closures; the vertex of the parabola."""
@@ -88,7 +91,7 @@ def test_fold_in_thirty_digits(m, n, which):
             assert abs(vertex - mpmath.mpf("4.07566753526546525")) < 1e-17
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "m, n, nu, pick",
     [
@@ -149,6 +152,7 @@ def test_ends():
     assert end(1, 2, -0.5) is None  # (27) has 1 - nu beta = -2 at m = 1 and 14/9 at m = 3: infinite in between
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("m, n", MODES)
 def test_curves_close_and_stop_where_they_should(m, n):
     """Every point satisfies both closures, in the raw unknowns (c, A, kappa_n); the last one is a circle or a limit."""
@@ -164,6 +168,7 @@ def test_curves_close_and_stop_where_they_should(m, n):
         assert last.label == "EP" and last.kappa_n == pytest.approx(-100, rel=1e-11)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("m, n, nu", [(1, 7, 0.0), (1, 7, 0.5), (7, 2, -0.85), (1, 4, -0.85), (5, 3, -0.3), (7, 1, 0.1)])
 def test_curves_at_other_poisson_ratios(m, n, nu):
     """As above, with eta_max^2 up to 10^3 and q down to 10^-31: closures hold wherever q survives the subtraction."""
@@ -173,6 +178,7 @@ def test_curves_at_other_poisson_ratios(m, n, nu):
     assert points[-1].label in ("BP", "EP")
 
 
+@pytest.mark.full
 def test_number_of_folds():
     """Bifurcation diagram at nu = .3: (1,3) turns twice, (3,4) once near 5.329, (5,6) never, (1,n >= 4) far out."""
     maximum, minimum = folds(1, 3)
@@ -182,6 +188,7 @@ def test_number_of_folds():
     assert all(folds(1, n)[0].kappa_n > 20 and folds(1, n)[0].eta_max_squared > 9 for n in (4, 5, 6, 7))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("m, n", [(1, 2), (1, 4), (3, 5)])
 def test_both_ends_see_the_same_branch(m, n):
     """Followed from either circle, a branch has the same folds: kappa_n, kappa* and the energy agree to round-off."""

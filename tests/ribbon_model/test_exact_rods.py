@@ -20,7 +20,7 @@ SOME = [(1, 2), (3, 4), (7, 3), (3, 1)]
 each_branch = pytest.mark.parametrize("law, root", BRANCHES)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @each_branch
 @pytest.mark.parametrize("nu", [-0.6, 0.0, 0.3])
 def test_branches_leave_and_end_on_circles(law, root, nu):
@@ -55,6 +55,7 @@ def test_branches_leave_and_end_on_circles(law, root, nu):
         assert law == "isotropic rod" and nu == 0 or np.all(slopes > 0) or np.all(slopes < 0)
 
 
+@pytest.mark.sample(1)
 @each_branch
 def test_small_amplitude(law, root):
     """kappa_n tends to the threshold linearly in A: extrapolated to A = 0, error O(A^3)."""
@@ -65,7 +66,7 @@ def test_small_amplitude(law, root):
         assert (8 * values[0] - 6 * values[1] + values[2]) / 3 == pytest.approx(expected, rel=1e-11)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @each_branch
 @pytest.mark.parametrize("m, n, nu", [(1, 2, 0.3), (1, 4, 0.3), (3, 4, 0.5), (5, 6, -0.3), (5, 2, 0.3)])
 def test_frame_equations_close(law, root, m, n, nu):
@@ -99,7 +100,7 @@ def test_frame_equations_close(law, root, m, n, nu):
     assert abs(quarter[5]) < 1e-10
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("m, n", [(1, 2), (1, 4), (3, 4), (3, 1)])
 @each_branch
 def test_against_the_collocation(law, root, m, n):
@@ -117,6 +118,7 @@ def test_against_the_collocation(law, root, m, n):
     assert np.hypot(middle["M1"], middle["M2"]) == pytest.approx(abs(there.mu), abs=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law, A", [("flat rod", 1e3), ("isotropic rod", 3.0)])
 def test_precession_by_the_other_directors(law, A):
     """(3, 1): azimuths of d_2, d_3 integrated by mpmath over the angle phi or M_3, close too, modulo pi."""
@@ -192,6 +194,7 @@ def test_solve():
                 assert "amplitude" in target
 
 
+@pytest.mark.full
 def test_refine_a_fold():
     """(1, 2) of the ribbon, nu = 3/10: kappa_n from an earlier, separate 30-digit quadrature (see test_exact)."""
     (fold,) = folds(1, 2)

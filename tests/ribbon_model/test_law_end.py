@@ -35,6 +35,7 @@ def pulled(material: Section, **options) -> contin.Branch:
     return contin.trace(strip.first_point(**options), free=["force_normal"], **settings)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("nu", "curvature", "intervals"),
     [(0.3, 0.3, 3), (0.3, 0.3, 10), (0.15, 0.15, 3), (0.15, 0.15, 10), (-0.2, 0.2, 10)],
@@ -140,6 +141,7 @@ def test_a_section_with_another_thickness_has_its_own_moment():
     assert margin_of(tapered, 1.0, -0.7 * 0.5**3, 0.0) == pytest.approx(0, abs=1e-14)
 
 
+@pytest.mark.full
 def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     """The least margin is inside the strip here, and beyond it omega_1 jumps: no state is found there."""
     tapered = section_of("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
@@ -158,6 +160,7 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
 # --- first states ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kappa_n", [0.0, 1.0, 4.0])
 def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
     """A clamped arch turns from one side to the other. The law that the sentence names finds it."""
@@ -173,6 +176,7 @@ def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
         assert wide.first_point(wide.arch())["distance"] == 0.95
 
 
+@pytest.mark.full
 def test_a_failure_that_is_not_of_the_law_keeps_its_sentence():
     """The natural arc bends to one side; its ends are far from the distance."""
     ribbon = OpenStrip(section_of("ribbon", {"nu": 0.3, "kappa_n": 3.0}), numbers={"distance": 0.99})

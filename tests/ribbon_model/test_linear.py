@@ -160,6 +160,7 @@ def published_stable(law, m, ratio, nu):
     return bool(np.all(squared_frequencies(1 - ratio, g, t, k)[1] > 0))
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("nu", (-0.3, 0.0, 1e-9, 0.3, 0.45))
 @pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=PAPER_LAWS)
 def test_intervals_by_scanning_all_modes(law, nu):
@@ -219,6 +220,7 @@ def index_by_assembly(law, m, kappa_n, nu, highest=40):
     return count
 
 
+@pytest.mark.full
 def test_index_against_an_assembled_second_variation():
     random = np.random.default_rng(3)
     for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD):

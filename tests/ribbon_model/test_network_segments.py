@@ -66,6 +66,7 @@ def test_derivatives_are_those_of_the_energy(everything):
                 assert curvature == pytest.approx(change @ hessian @ change, rel=1e-5)
 
 
+@pytest.mark.full
 def test_energies_tend_to_those_of_the_continuous_network(everything):
     """As the square of the length of segments."""
     network, point = everything
@@ -82,7 +83,7 @@ STATES = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", STATES)
 def test_the_index_is_that_of_the_continuous_network(name):
     """The number of negative eigenvalues of the segments' Hessian: another way to the index of the whole network."""

@@ -32,6 +32,7 @@ def held_where_it_is(strip, segments):
     return replace(chain, numbers={name: here.get(name, value) for name, value in strip.parameters.items()})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "ends", ["clamped", "free", *(pytest.param(name, marks=pytest.mark.full) for name in ("hinged", "ball"))]
 )
@@ -52,6 +53,7 @@ def test_derivatives_against_differences(ends):
     np.testing.assert_allclose(second, hessian, atol=1e-6 * np.abs(hessian).max())
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("law", "numbers"),
     [

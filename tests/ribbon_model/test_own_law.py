@@ -148,6 +148,7 @@ def branch():
     return contin.trace(point_of(system, x), settings, tangent=tangent)
 
 
+@pytest.mark.full
 def test_a_primary_branch_against_its_quadrature(branch):
     """It leaves the single loop at the threshold and ends on the triple one; energy and kappa* between these."""
     assert branch.points[0]["kappa_n"] == pytest.approx(threshold(1, 2), abs=1e-10)
@@ -168,6 +169,7 @@ def test_the_half_loop_bifurcates_at_the_thresholds():
     assert x[system.parameter_index("kappa_n")] == pytest.approx(expected[0], abs=1e-9)
 
 
+@pytest.mark.full
 def test_index_and_descent(branch):
     """The index of the branch is that of two meshes; an unstable circle comes to rest where the energy says."""
     solutions = [Solution.of(point) for point in branch.points[2:-1:6] if not point.label]
@@ -186,6 +188,7 @@ def test_index_and_descent(branch):
 # --- open strips --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_strip_bent_by_a_moment():
     """Between a clamped end and a hinge with a dead moment it is an arc, omega_1 = kappa_n + y, for every moment."""
     section = Section(LAW, {**NUMBERS, "kappa_n": 0.5})
@@ -231,6 +234,7 @@ def test_buckling_of_straight_strips():
     assert found.labelled("BP")[0]["force_width"] == pytest.approx(critical, rel=1e-8)
 
 
+@pytest.mark.full
 def test_an_unfolded_arc_leaves_its_plane():
     """The linear theory of section 5 in two ways, and the variational problem of the open strip."""
     xi = np.array([0.3, 0.8, 1.6])
@@ -273,6 +277,7 @@ def test_what_it_does_not_state_is_refused():
 # --- scenes -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_sweep_of_open_scenes(monkeypatch, tmp_path):
     """Found by its name, it is the law of scenes: its length takes three values, and each moment bends as it must."""
     monkeypatch.setitem(laws.OPEN_LAWS, LAW.name, LAW)

@@ -52,7 +52,7 @@ def shot(turn: float) -> float:
     return end(z)[-1]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("phase", ["", "spin", "shift, right", "shift, left", "shift, two waves"])
 def test_a_cut_ring_with_an_end_turned(phase):
     """No symmetry moves it: every phase is a load, which is said, with its multiplier. Without one the energy is right."""
@@ -102,7 +102,7 @@ def test_phases_beyond_the_symmetries(numbers, phases, has):
     assert str(error.value) == f"phases: {phases}: each holds a continuous symmetry, and the strip has {has}"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("stiffness", "turn"), [(1.0, 14.5), (3.0, math.pi)], ids=["a ring that spins", "a band that shifts"])
 def test_the_phases_that_a_message_recommends_are_no_loads(stiffness, turn):
     """All of them lead to states of one energy, on which none has a multiplier; nor on the branch of such states."""

@@ -84,7 +84,7 @@ def least_of_section(w1, w3, kappa_n, D, Gamma):
     return float(weights @ density)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("D", PLATES)
 @pytest.mark.parametrize("Gamma", [0.3, 2.0, 6.0])
 def test_finite_width_is_the_least_over_profiles(D, Gamma):

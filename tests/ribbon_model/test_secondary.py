@@ -50,6 +50,7 @@ PLACES = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("law", "m", "n", "kappa_n", "reversal"), PLACES)
 def test_a_bifurcation_is_simple_on_the_half_loop_with_its_symmetry(law, m, n, kappa_n, reversal):
     primary = at(law, m, n, kappa_n)
@@ -68,6 +69,7 @@ def test_a_simple_mode_does_not_leave_the_other_half_loop(m, kappa_n, other):
         secondary_branch(Solution.of(at(RIBBON, m, 1, kappa_n)), HALF_LOOPS[other])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("m", "n", "kappa_n", "reversal"), [(5, 1, -24.4451886, "axis"), (5, 2, -20.0441574, "mirror")])
 def test_the_loop_closes_and_is_in_equilibrium(m, n, kappa_n, reversal):
     """The half loop unfolded satisfies the equations of the whole loop, and an integration by DOP853 comes back."""
@@ -109,6 +111,7 @@ def test_the_index_by_symmetry_is_that_of_the_loop_without(reversal):
     assert ours.decided and theirs.decided and ours.index == theirs.index
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("law", "m", "n", "kappa_n", "reversal", "more"),
     [(RIBBON, 3, 1, -21.6268175, "mirror", 1), (RIBBON, 5, 1, -24.4451886, "axis", 1),

@@ -70,6 +70,7 @@ def test_circles_by_conjugate_points(law):
         assert found.index == linear.index(law, m, kappa_n, NU), (m, kappa_n)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("m", "n", "expected"),
     [
@@ -100,7 +101,7 @@ def test_one_direction_changes_at_a_fold_and_keeps_the_symmetry(m, n):
         assert abs(before[0, "even"].negative - after[0, "even"].negative) == 1
 
 
-@pytest.mark.sample(3)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("m", "n", "law"),
     [
@@ -179,6 +180,7 @@ def whole(at):
 LONGER = pytest.param(3, 4, ISOTROPIC_ROD, marks=pytest.mark.full)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("m", "n", "law"), [(1, 3, RIBBON), (5, 2, RIBBON), (7, 3, FLAT_ROD), LONGER])
 def test_symmetry_classes_add_up_to_the_whole_loop(m, n, law):
     """The quarter wave in classes, and the whole loop as one piece, of which no symmetry is known."""

@@ -26,6 +26,7 @@ def test_closed_form_is_the_shooting_determinant(law, theta_n):
     assert np.max(np.abs(direct - closed) / (np.abs(direct) + 1e-3)) < 1e-8
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("law", TABLE_2_LAWS, ids=lambda law: law.name)
 @pytest.mark.parametrize("nu", (0.01, 0.1, 0.3, 0.49))
 def test_two_routes_to_the_first_root(law, nu):

@@ -25,6 +25,7 @@ def circle():
     return contin.trace(start, free=FREE, limits={"kappa_n": (0, 3.15)})
 
 
+@pytest.mark.full
 def test_every_primary_bifurcation_is_passed_and_reported(circle):
     found = [point for point in circle if point.label == "BP"]
     expected = [thresholds(RIBBON, 1, n, NU)[0] for n in (2, 3, 4)]  # the linear theory

@@ -91,6 +91,7 @@ ALLEN_CAHN = contin.BoundaryValueProblem(
 )  # fmt: skip
 
 
+@pytest.mark.full
 def test_counts_of_allen_cahn_and_its_closed_form():
     """Zero has the eigenvalues 1 - (n pi / L)^2. Of the branch with n half waves n - 1 are unstable (Chafee & Infante)."""
     zero = trace(ALLEN_CAHN, [0, 0], "square", (1.0, 100.0))
@@ -179,6 +180,7 @@ def lines(n):
     return contin.AlgebraicProblem(field, names, {"a": A, "b": 5.05}, count=2 * n)
 
 
+@pytest.mark.full
 def test_lyapunov_coefficients_are_those_of_the_reaction_and_of_the_method_of_lines():
     """The uniform mode is that of the reaction. cos(pi s) has the mean square 1/2; its squares at n nodes add to (n + 1)/2."""
     uniform_mode, first = contin.trace(uniform(4.9), free=["b"], limits={"b": (4.9, 5.2)}).labelled("HB")
@@ -195,6 +197,7 @@ def test_lyapunov_coefficients_are_those_of_the_reaction_and_of_the_method_of_li
     assert first.name == "Hopf, supercritical"
 
 
+@pytest.mark.full
 def test_a_curve_of_hopf_points_in_two_parameters_of_which_one_is_a_diffusivity():
     def field(t, u, p):
         grown = u.x**2 * u.y
@@ -255,6 +258,7 @@ def snake(problem, guess):
     )  # fmt: skip
 
 
+@pytest.mark.full
 def test_folds_of_the_snake_change_the_stability_as_the_index_of_its_energy_does():
     def changes(branch, count):
         """The counts between folds, whose own is not known."""
@@ -464,6 +468,7 @@ def chebyshev(count):
     return (x + 1) / 2, 2 * (matrix - np.diag(matrix.sum(axis=1)))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_random_linear_fields_against_a_spectral_method(seed):
     """w_t = D w'' + B w' + C(s) w with conditions on w, or on w' and w, at both ends: counts, and eigenvalues within errors."""

@@ -31,6 +31,7 @@ def _half_ring(kind: str) -> VariationalProblem:
     )  # fmt: skip
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["follower", "dead", "central"])
 def test_a_ring_under_three_kinds_of_pressure(kind):
     """p R^3 / B = n^2 - 1 where it follows the ring, n^2 where it does not turn, (n^2 - 1)^2 / (n^2 - 2) to the centre."""
@@ -71,6 +72,7 @@ def _straight(problem):
     return contin.trace(contin.solve(problem, guess), free=["load"], limits={"load": (0, 60)}, progress=False)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("part", "pieces"), [(0.3, 1), (0.45, 2), (-1.0, 1)])
 def test_a_column_whose_load_follows_in_part(part, pieces):
     """cos k = -a / (1 - a) with k^2 = P, for the part a that follows, from w'''' + k^2 w'' = 0, w''' + (1 - a) k^2 w' = 0."""

@@ -42,6 +42,7 @@ def _clamped(cuts):
     return SegmentedVariationalProblem(rods, {"load": 30.0}, ends=joined, end_energy=lambda a, b, p: p.load * b[-1].x)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("cuts", [(), (0.3,), (0.11, 0.5, 0.83)])
 def test_a_cut_changes_nothing(cuts):
     """Euler's loads 4 pi^2, 4 (4.4934...)^2, the root of tan z = z; 16 pi^2; index from 0 to 3."""
@@ -87,6 +88,7 @@ def test_an_energy_that_is_not_quadratic():
 # --- frames ---------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "clamped, length",
     [(True, 2.71645974768613), (False, 1.34955282371664)],  # k l cot(k l) = -6, k l tan(k l) = 6

@@ -51,6 +51,7 @@ def planar(ends=None, offset=True):
 PINNED = planar()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "problem, loads",
     [
@@ -410,6 +411,7 @@ def test_division_by_zero_at_the_guess_is_said():
         contin.solve(problem, [0.0])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("before", [1e-1, 1e-4, 1e-8])
 def test_changes_of_the_index_behind_a_limit(before):
     """A run that ends right before the first buckling load, 4 pi^2, has index 0 throughout: what its last step passes behind

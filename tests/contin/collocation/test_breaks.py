@@ -51,6 +51,7 @@ def slope(load, breaks, q=0.6):
     return brentq(end, 0, 1.2, xtol=1e-14)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("degree", [2, 4])
 def test_a_coefficient_that_jumps(name, degree):

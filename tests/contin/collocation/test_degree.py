@@ -32,6 +32,7 @@ def test_table_of_the_documentation():
             assert [usual_degree(n, tolerance) for tolerance in tolerances] == list(map(int, degrees)), n
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("states", [1, 2, 4, 7, 13, 19, 30, 60, 500])
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
 def test_it_is_never_far_from_the_cheapest(states, tolerance):
@@ -80,6 +81,7 @@ RUNS = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if "twenty" in name else name for name in RUNS])
 def test_runs_at_the_default_take_less_than_twice_the_best(name, monkeypatch):
     """Time by the law: two factorizations a point, which kernels make, and those of what Python looks at.

@@ -98,6 +98,7 @@ def prepared(name):
     return system, x, vectors, random.standard_normal(system.equations)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_derivatives_along_directions(name):
     """Differences of the residual, of fourth order, along lines through x."""
@@ -109,6 +110,7 @@ def test_derivatives_along_directions(name):
         assert found == pytest.approx(expected, abs=error * np.abs(expected).max())
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_bent_is_the_derivative_of_the_transposed_product(name):
     system, x, (a, b, _), w = prepared(name)

@@ -82,6 +82,7 @@ def system_of(make):
     return system, x
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("make", [bratu, with_an_integral, scaled, cycles, front, loop])
 @pytest.mark.parametrize("off", [1e-3, 3e-2])
 def test_the_same_as_in_python(make, off, monkeypatch):
@@ -113,6 +114,7 @@ def test_conditions_of_the_call_count():
     assert np.abs(system.residual(correct(system, x, row, 0.1, Newton(1e-11)).x)).max() < 1e-9
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("make", [front, loop])
 def test_projection_conditions_are_those_of_python(make):
     system, x = system_of(make)

@@ -81,6 +81,7 @@ def slope_at_start(law, levels, near, q=2.0):
     return brentq(late, near - 0.02, near + 0.02, xtol=1e-14)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("degree", [3, 7])
 def test_conditions_on_a_state(name, degree):
@@ -124,6 +125,7 @@ def load_of(largest):
     return (2 * t) ** 2
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("degree", [3, 6])
 def test_a_fold_close_behind_the_first_contact(degree):
     known = -minimize_scalar(lambda m: -load_of(m), bounds=(0.501, 0.53), method="bounded", options={"xatol": 1e-9}).fun
@@ -247,6 +249,7 @@ def test_dry_friction():
     assert note.startswith("the equations jump where v changes its sign (t = 0.4")
 
 
+@pytest.mark.full
 def test_a_fold_on_a_jump_has_no_label():
     """u'' + q exp(u) (1 or .97): derivatives leave the jump out."""
     problem = BoundaryValueProblem(

@@ -16,7 +16,7 @@ def origin(field, parameters, **values):
     return contin.solve(AlgebraicProblem(field, ["x", "y", "z"], {**parameters, **values}), [0.0, 0.0, 0.0])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("r", [12.0, 20.0])
 def test_lorenz_from_both_sides(r):
     """r = 13.926557407520: Doedel, Krauskopf & Osinga (2006) and others give 13.9265574075."""

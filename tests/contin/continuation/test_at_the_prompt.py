@@ -158,6 +158,7 @@ def test_round_off_above_the_tolerance():
     assert any("round-off above its tolerance" in note for note in branch.notes)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("rate", "size"), [(100, 1.0), (300, 1.0), (300, 1e4), (1000, 1.0), (1000, 1e4), (20, 1e4)])
 def test_an_advice_does_not_fail_at_once(rate, size):
     """x = a^2 with round-off of size e^(rate a): a looser tolerance that is advised leads on by at least a first step."""

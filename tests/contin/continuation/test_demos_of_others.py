@@ -15,6 +15,7 @@ def labelled(branches, label, name):
     return sorted(point[name] for branch in branches for point in branch.labelled(label))
 
 
+@pytest.mark.full
 def test_morris_and_lecar():
     """Rinzel and Ermentrout 1989: 93.86 and 212; here the trace of the Jacobian along the equilibria."""
     c, vk, gk, vca, gca, vl, gl, phi, v1, v2, v3, v4 = 20, -84, 8, 120, 4.4, -60, 2, 0.04, -1.2, 18, 2, 30
@@ -131,6 +132,7 @@ def test_soap_film():
     assert labelled([branch], "LP", "L") == pytest.approx([x / math.cosh(x)], rel=1e-11)
 
 
+@pytest.mark.full
 def test_schnakenberg():
     """pde2path's demo: Turing's bifurcation at sqrt(60) sqrt(3 - sqrt 8), but for the differences."""
     n, wave = 100, np.sqrt(np.sqrt(2) - 1)
@@ -153,6 +155,7 @@ def test_schnakenberg():
     assert known == pytest.approx(np.sqrt(60) * np.sqrt(3 - np.sqrt(8)), rel=1e-6)
 
 
+@pytest.mark.full
 def test_ginzburg_and_landau():
     """pde2path and BifurcationKit: the field begins to oscillate at r = j^2, with frequency nu = 1."""
     mu, c3 = 0.1, -1.0
@@ -172,6 +175,7 @@ def test_ginzburg_and_landau():
     assert labelled([branch], "HB", "r") == pytest.approx([1, 4, 9], rel=1e-11)
 
 
+@pytest.mark.full
 def test_kuramoto_and_sivashinsky():
     """Odd states by Galerkin's method; Kevrekidis, Nicolaenko and Scovel 1990: 16.1399, 22.559, Hopf point at 30.345."""
     count = 16

@@ -135,6 +135,7 @@ def assert_alike(points, others, tolerance=1e-10):
         assert point.functionals == pytest.approx(other.functionals, abs=tolerance, rel=tolerance)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("name", RUNS)
 def test_the_same_branch_as_one_by_one(name, direction):

@@ -70,7 +70,7 @@ def bits(value):
     return value.hex() if isinstance(value, float) else repr(value)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("case", [growing, pendulum, turning, sparse])
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_the_same_run_twice(case):

@@ -18,6 +18,7 @@ def bratu(size, unit):
     )  # fmt: skip
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("size", "unit"), SIZES)
 def test_fold_of_bratu(size, unit):
     start = contin.solve(bratu(size, unit), [0, 0])
@@ -27,6 +28,7 @@ def test_fold_of_bratu(size, unit):
     assert abs(fold["q"] / unit - FOLD) < max(10 * fold.errors["q"] / unit, 1e-13) < 1e-9
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("size", "unit"), SIZES)
 def test_buckling_and_what_follows(size, unit):
     """u'' = -P sin u, u(0) = u(1) = 0: P = pi^2, 4 pi^2. Nothing shows how large u will be: it is said."""
@@ -79,6 +81,7 @@ def test_sensitivity_and_fold_curve_in_odd_units():
     assert folds.column("q") * folds.column("f") == pytest.approx(np.full(len(folds), FOLD), rel=1e-11)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("offset", [0.0, 3.0])
 @pytest.mark.parametrize("height", [1.0, 1e-3, 1e-6, 1e-9, 1e-11])
 def test_folds_of_a_parameter_that_hardly_changes(height, offset):

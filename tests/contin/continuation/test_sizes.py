@@ -27,7 +27,7 @@ def located(branch, name, unit, count):
 # --- a limit is no size ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("limit", [1e3, 1e6, 1e10, 1e200, 1.7e308])
 @pytest.mark.parametrize("load", [1.0, 1e-6, 1e6])
 def test_buckling_loads_whatever_the_limit(limit, load):
@@ -36,6 +36,7 @@ def test_buckling_loads_whatever_the_limit(limit, load):
     assert found == pytest.approx([(math.pi * k) ** 2 for k in range(1, 7)], rel=1e-11) and error < 1e-8
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("limits", [(-100, 100), (-1e8, 1e8), (-1e200, 1.0)])
 def test_buckling_loads_of_negative_sign(limits):
     """The column pulled by -P."""
@@ -46,6 +47,7 @@ def test_buckling_loads_of_negative_sign(limits):
     assert located(branch, "P", -(math.pi**2), 3)[0] == pytest.approx([1, 4, 9], rel=1e-11)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("limit", [20.0, 1e6, 1e200])
 @pytest.mark.parametrize("coupled", [False, True])
 def test_branch_points_of_equilibria_whatever_the_limit(limit, coupled):
@@ -85,6 +87,7 @@ def test_a_linear_problem_reaches_a_generous_limit():
 # --- amplitudes ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("load", "height"), [(1.0, 1e-8), (1e6, 1e-5), (1e-7, 1e7), (1e9, 1e9)])
 def test_the_amplitude_of_a_buckled_column_is_found(load, height):
     """The same branch in all units: at P = 20 its slopes at the hinges are those of the column with P = 20 in units of one.
@@ -102,6 +105,7 @@ def test_the_amplitude_of_a_buckled_column_is_found(load, height):
     assert ends[1] == pytest.approx(ends[0], rel=1e-9, abs=1e-10)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("power", [2, 3, 4, 5])
 @pytest.mark.parametrize("size", [1e-7, 1.0, 1e8])
 def test_branches_that_leave_as_a_power(power, size):
@@ -113,6 +117,7 @@ def test_branches_that_leave_as_a_power(power, size):
     assert fork.stop.reason == "limit" and abs(fork.points[-1]["x"]) == pytest.approx(size, rel=1e-9)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(12))
 def test_random_elasticas(seed):
     """theta' = c0 m, m' = -P c1 sin theta (1 + e cos theta), y' = c2 sin theta, clamped and free: P = (k - 1/2)^2 pi^2 unit.
@@ -135,6 +140,7 @@ def test_random_elasticas(seed):
 # --- coefficients with a pole ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("load", [0.0, 5.0])
 @pytest.mark.parametrize("heated", [False, True])
 def test_a_clamped_circular_plate(load, heated):
@@ -175,7 +181,7 @@ ORBITS = [
 ]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "limits", "numbers"), ORBITS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_unfolding_parameters_that_are_zero(name, limits, numbers, direction):
@@ -231,6 +237,7 @@ SMALL = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("radius", [1e-3, 1e-5, 1e-7, 1e-9])
 @pytest.mark.parametrize("kind", SMALL)
 def test_small_closed_curves(kind, radius):
@@ -260,6 +267,7 @@ def test_a_small_closed_curve_of_a_boundary_value_problem(radius):
     assert [point["a"] / radius for point in branch.labelled("LP")] == pytest.approx([1, -1], rel=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_states_of_modes_that_are_close(seed):
     """Branches leave at eigenvalues that differ by a tenth, at an amplitude of 1e-9: the branch points are the eigenvalues."""
@@ -287,6 +295,7 @@ def test_a_branch_that_begins_where_the_load_has_grown(height):
     assert pytest.approx((2 * ellipk(half / 2)) ** 2, rel=1e-9) == 12 / 0.8
 
 
+@pytest.mark.full
 def test_round_off_of_sums_that_cancel_is_no_size():
     """A multiplier of a shallow arch is zero, a sum of two others: what is left of them moves neither with x nor with them."""
     arch = contin.VariationalProblem(

@@ -91,6 +91,7 @@ EPS = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("eps", EPS)
 def test_canards_of_fitzhugh_and_nagumo(eps):
     """Cycles leave a Hopf point backwards, turn in the explosion, and do so again at the other end: HB LP LP HB, both ways.
@@ -140,6 +141,7 @@ def test_canards_of_the_oregonator(eps):
     assert runs[0].labelled("LP")[0]["f"] == pytest.approx(runs[1].labelled("LP")[0]["f"], abs=1e-7)
 
 
+@pytest.mark.full
 def test_a_branch_that_bends_within_a_shorter_way_than_the_smallest_step():
     """Where canards get their head, the branch turns within 1e-8 of arclength: the run goes on, and says so."""
     problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "eps": 0.04, "q": 8e-4})

@@ -45,6 +45,7 @@ def lyapunov_family():
     return contin.trace(start, free=["l", "period"], primary="period", limits={"period": (2.6, 6)})
 
 
+@pytest.mark.full
 def test_the_labels_of_a_family_of_three_bodies(lyapunov_family):
     """Branch points where the vertical pair is 1: halo orbits, and the axial family; and a period doubling where it is -1.
 

@@ -56,6 +56,7 @@ def test_doublings_of_roessler():
             assert np.abs(np.abs(exponents.imag) - math.pi + np.abs(exponents.real) * 1j).min() < 1e-9
 
 
+@pytest.mark.full
 def test_a_curve_of_tori_passes_all_strong_resonances():
     """On mu = 0 the pair lies on the circle between the edges of Mathieu's equation, which are the resonances 1:1 and 1:2."""
     (torus,) = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)}).labelled("TR")
@@ -270,6 +271,7 @@ def integrated(point):
     return np.transpose(columns)
 
 
+@pytest.mark.full
 def test_multipliers_on_curves():
     """On a curve of period doublings one is -1, of torus bifurcations a pair has the column's angle; at a given period none."""
     problem = CycleProblem(

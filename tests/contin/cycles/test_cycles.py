@@ -271,6 +271,7 @@ def lorenz_84(u, p):
     return -(u.y**2) - u.z**2 - (u.x - p.F) / 4, u.x * u.y - 4 * u.x * u.z - u.y + 0.25, 4 * u.x * u.y + u.x * u.z - u.z
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("errors", [True, False])
 def test_cycles_that_outgrow_the_sizes_of_their_hopf_point(errors):
     """There y is 2e-4; on the cycles it is of order one. The doubling by shooting (DOP853, det(M + I) = 0)."""

@@ -44,6 +44,7 @@ def resonance(field, **values):
     return contin.trace(orbit, free=["w"], direction=-1, limits={"w": (0.3, 15)})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("q", [1.0, 2.0])
 def test_edges_of_stability_of_mathieu(q):
     """x = 0 is a cycle for all a. A multiplier is 1 or -1 at the edges a_n(q), b_n(q), from SciPy: BP for even n, PD for odd n.

@@ -17,6 +17,7 @@ def labels(branch):
     return [point.label for point in branch if point.label]
 
 
+@pytest.mark.full
 def test_edges_of_stability_of_mathieu():
     """a_n(q) and b_n(q), from SciPy: one call each from q = 1 to q = 5. Both multipliers are -1 or 1 all along."""
     problem = CycleProblem(mathieu, ["x", "v"], {"a": -3.0, "q": 1.0}, period=math.pi)
@@ -127,6 +128,7 @@ def symmetric(point, function, names):
     return known.x[2:]
 
 
+@pytest.mark.full
 def test_a_resonance_that_a_symmetry_makes_touch():
     """A pair of half a round passes i and -i: that of the round comes to -1 and goes back, kappa + 1 has no change of sign."""
 
@@ -152,6 +154,7 @@ def test_a_resonance_that_a_symmetry_makes_touch():
         assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("m1", [0.01, 0.5])
 def test_torus_bifurcations_end_on_a_symmetric_cycle(m1):
     """Cycles that have an image become their own: the curve would go back as its mirror image from a point where it is R1."""

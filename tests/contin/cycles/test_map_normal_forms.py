@@ -128,6 +128,7 @@ def test_area_preserving_maps_have_no_coefficient_at_doublings():
         assert abs(point["k"] - 4) < 1e-6 and point.normal_form is None
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("a", [0.3, 0.45, 0.5, 0.55, 0.8, 1.0])
 def test_maps_that_keep_areas_have_no_chenciner_points(a, direction):

@@ -158,6 +158,7 @@ def test_the_coefficient_is_a_column():
 COUPLINGS = [{"g": 0.0, "k": 0.0, "h": 0.0}, {"g": 0.7, "k": 1.3, "h": 0.8}, {"g": 0.7, "k": 1.3, "h": 2.8}]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("coordinates", [lambda field: field, bent])
 @pytest.mark.parametrize("given", COUPLINGS)
 def test_of_a_period_doubling(given, coordinates):
@@ -169,6 +170,7 @@ def test_of_a_period_doubling(given, coordinates):
     assert point.name == f"period doubling, {'super' if expected < 0 else 'sub'}critical"
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("coordinates", [lambda field: field, bent])
 @pytest.mark.parametrize("given", COUPLINGS)
 def test_of_a_torus_bifurcation(given, coordinates):

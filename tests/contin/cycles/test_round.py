@@ -72,7 +72,7 @@ COUPLINGS = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("coupling", COUPLINGS)
 @pytest.mark.parametrize(("name", "phased"), [("spread", False), ("spread", True), ("symmetric", True), ("forced", False)])
 def test_against_the_whole_matrix(name, phased, coupling):

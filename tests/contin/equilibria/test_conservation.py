@@ -139,6 +139,7 @@ def exact_rank(rows):
     return rank
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("seed", range(40))
 def test_random_networks(seed):
     """As many totals as states less the rank of the rates, which is exact, with constants between 1e-3 and 1e3.

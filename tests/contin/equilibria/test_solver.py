@@ -79,7 +79,7 @@ def test_branch_points_are_those_of_closed_forms(solver):
         assert Plain.made > before[0] and all(Plain.solves[kind] > before[1][kind] for kind in "NT")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("solver", [None, Plain])
 def test_points_where_two_modes_become_singular(solver):
     branch = flat(square(), SIDE**2, solver, 60)
@@ -89,6 +89,7 @@ def test_points_where_two_modes_become_singular(solver):
     assert double.name == "kernel of dimension 2" and not branch.notes
 
 
+@pytest.mark.full
 def test_folds_are_passed_by_bordered_matrices():
     """Bratu's problem by finite differences; the matrix itself is singular at the fold."""
 
@@ -105,6 +106,7 @@ def test_folds_are_passed_by_bordered_matrices():
     assert folds == pytest.approx([3.513830719125161] * 2, abs=10 / LINE**2) and folds[0] == pytest.approx(folds[1], rel=1e-11)
 
 
+@pytest.mark.full
 def test_eigenvalues_are_found_with_it():
     """Hopf points of a plate of oscillators (x' = mu x - y ..., diffusion): the first at mu = 0, others from 0.08 on."""
 
@@ -138,6 +140,7 @@ def test_singular_matrices():
     assert factors.sign == 0 and np.isnan(factors.solve(np.ones(3))).all()
 
 
+@pytest.mark.full
 def test_factors_of_points_that_were_left_are_freed_at_once(monkeypatch):
     """Without collecting cycles of references: those of a large problem fill the memory."""
     made = weakref.WeakSet()

@@ -27,6 +27,7 @@ def layer_error(point):
     return max(np.abs(states - np.tanh((mesh - c) / WIDTH)).max(), abs(point["mean"] - mean), abs(point["square"] - square))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("degree", "tolerance"), [(4, 1e-7), (4, 1e-10), (6, 1e-10), (7, 1e-12)])
 def test_a_layer_that_leaves_its_mesh_behind(degree, tolerance):
     """The mesh is looked at every 40 steps only, while the layer moves: each point is good enough in itself.
@@ -42,6 +43,7 @@ def test_a_layer_that_leaves_its_mesh_behind(degree, tolerance):
         assert point.discretization_error < tolerance or point.label
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("degree", "intervals"), [(2, 100), (3, 60), (4, 40), (4, 100), (5, 40), (7, 30)])
 def test_the_estimate_on_a_mesh_that_is_kept(degree, intervals):
     """Without adaptation the errors are large, and stated: neither too small, nor too large by much.
@@ -175,6 +177,7 @@ def test_points_of_a_fold_curve():
     assert checked > 2
 
 
+@pytest.mark.full
 def test_the_column_is_shown_and_kept(tmp_path):
     start = contin.solve(LAYER, [0.0], degree=3, intervals=12, mesh=contin.MeshControl(every=0))
     options = {"limits": {"c": (0.1, 0.8)}, "mesh": contin.MeshControl(every=0)}

@@ -68,6 +68,7 @@ def test_two_zeros_beside_a_fold_stay_two():
     assert [point.x[0] for point in branch.labelled("UZ")] == pytest.approx([1e-3, -1e-3], rel=1e-6)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_fold_close_to_a_branch_point(apart, side):

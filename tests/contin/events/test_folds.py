@@ -81,6 +81,7 @@ def close_folds(x, square):
     return 2 * x**3 / 3 - 2 * square * x + 2 * x * s - (x**2 - 2 - square) * c - (2 + square)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("apart", [1e-1, 1e-3, 1e-5])
 @pytest.mark.parametrize("start", np.linspace(-1, -0.4, 13))
 def test_two_folds_close_together(apart, start):
@@ -108,6 +109,7 @@ def test_one_cubic_inflection_is_no_fold():
     assert labels(trace(start, free=["mu"], limits={"mu": (-1, 1)})) == ["EP"]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("apart", [0.003, 0.01, 0.026, 0.0485, 0.1, 0.3])
 @pytest.mark.parametrize("step", [0.05, 0.3, 1.0])
 def test_folds_on_both_sides_of_a_pitchfork(apart, step):
@@ -154,6 +156,7 @@ def test_a_vertical_branch_of_a_discretized_column_has_no_folds(factor):
     assert note.startswith("lam stays at 9.86116") and "a vertical family" in note
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("steps", range(12))
 def test_a_hysteresis_point_is_no_fold(steps):
     """A stirred tank, p2 = 16, p3 = 3: both folds meet at x = 1/2, y = 2, p1 = exp(-2), where p1 stands still and goes on.

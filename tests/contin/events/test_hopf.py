@@ -59,6 +59,7 @@ def test_several_hopf_points_in_one_step(rates, places):
     assert [point["mu"] for point in branch.labelled("HB")] == pytest.approx(places, abs=1e-10)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("nu", [0.1, 0.014, 0.0027, 0.0012, 0.00075, 0.00013])
 @pytest.mark.parametrize("start", [3.1, 5.5, 7.7])
 def test_a_hopf_point_in_the_same_step_as_a_fold(nu, start):
@@ -172,7 +173,7 @@ def test_a_large_problem_may_start_at_zero():
     assert abs(branch.labelled("BP")[0]["lam"] - exact) < 1e-10
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("place", [-0.611, -0.5014, -0.2286, -0.1, 0.3, 0.77])
 @pytest.mark.parametrize("coupling", [0.205, 0.21, 0.25, 0.4])
 def test_two_hopf_points_close_to_each_other_in_a_long_step(place, coupling):

@@ -77,6 +77,7 @@ def test_a_start_on_a_user_zero_is_not_labelled_again():
         assert [mean for mean, _ in again] == pytest.approx([mean for mean, _ in others], abs=1e-10)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("start", [0.0, -1e-13, 1e-13])
 def test_a_limit_is_not_passed_from_a_start_on_it(start):
     point = solve(bratu(), [0, 0], {"lam": start}, degree=6)
@@ -99,6 +100,7 @@ def test_a_limit_far_beyond_a_fold_is_met_on_the_way_back():
     assert labels(branch) == ["LP", "EP"] and math.isclose(branch.points[-1]["lam"], 1.0, abs_tol=1e-12)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("gap", [1e-1, 1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("options", [{"step": 0.05}, {"step": 2.9}, {"step": 4.0, "accuracy": 0.2, "angle": 1.4}])
 @pytest.mark.parametrize("branch_points", [True, False])
@@ -110,6 +112,7 @@ def test_no_step_leads_to_the_other_arm_of_a_hyperbola(gap, options, branch_poin
     assert min(point.x[0] for point in branch) > 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("gap", [1e-1, 1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("branch_points", [True, False])
 def test_an_arm_of_a_hyperbola_turns_back(gap, branch_points):

@@ -46,6 +46,7 @@ def test_layers_are_no_branch_points(name):
         assert all("round-off" in note for note in each.notes)  # that is near, with any solver
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LAYERS)
 @pytest.mark.parametrize("count", [1, 2])
 def test_branch_points_beside_layers(name, count):

@@ -20,6 +20,7 @@ def disc(push: float) -> contin.VariationalProblem:
     )  # fmt: skip
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("push", [0.0, 1e-7, 0.5])
 def test_the_multiplier_is_the_force_that_the_phase_holds_back(push):
     """At y = 0 the phase holds the force by itself: mu = push. Without it there is a circle of solutions, and mu = 0."""

@@ -47,7 +47,7 @@ def trivial_branch(spectrum, seed, symmetric, limits=None, nonlinear=(0.0, 1.0, 
     return contin.trace(start, free=["lam"], limits={"lam": limits or (0, 1.5 * max(spectrum))}, **options)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("nonlinear", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.5, 1.0, 1.0)])
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize("seed", range(4))
@@ -152,7 +152,7 @@ def found_on(branch):
     return [(round(point["a"], 6), getattr(point.details, "dimension", 1)) for point in branch.labelled("BP")]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("dynamics", [True, False])
 @pytest.mark.parametrize("step", [34.0, 100.0])
 def test_double_points_of_a_grid_in_long_steps(step, dynamics):
@@ -179,6 +179,7 @@ def steps_of(spectrum, low, high, symmetric, seed):
     return [DenseFactors(np.vstack([np.eye(n, n + 1) * lam - np.pad(matrix, ((0, 0), (0, 1))), row])) for lam in (low, high)]
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("seed", range(60))
 def test_a_count_that_is_clear_is_right(seed):
     """Of random spectra with double eigenvalues, small and large, over steps that pass up to some 30 of them."""

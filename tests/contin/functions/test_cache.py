@@ -56,6 +56,7 @@ def test_machine_code_is_kept(kernel, tmp_path):
     assert found.__name__ == "_twice" and found.__doc__ == "Double the sum." and found.__module__ == __name__
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("length", [0, 1, 20, 300, -1])
 def test_files_cut_anywhere_are_replaced(kernel, tmp_path, length):
     kernel()(X, 2)
@@ -84,6 +85,7 @@ def test_code_of_another_key_under_the_same_name_is_not_taken(kernel, tmp_path):
     assert other(X, 2) == 12.0
 
 
+@pytest.mark.full
 def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
     kernel()(X, 2)
     key, path = kernel().key, cache.cache_directory() / f"k{kernel().key}.bin"
@@ -99,6 +101,7 @@ def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
     assert path.read_bytes() == made
 
 
+@pytest.mark.full
 def test_the_second_process_makes_kernels_of_modules(tmp_path, monkeypatch):
     (tmp_path / "one_kernel.py").write_text(
         "from contin.functions.kernel import kernel\n\n@kernel\ndef one(x: int) -> int:\n    return x + 1\n"
@@ -192,6 +195,7 @@ def test_code_of_another_source_is_not_taken_from_the_package(library, monkeypat
         Kernel(_flat, reorder=True)(np.eye(2))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -299,6 +303,7 @@ for name in sys.argv[1:]:
 """
 
 
+@pytest.mark.full
 def test_functions_of_one_name_compiled_by_two_processes_stay_apart(folder, tmp_path):
     """Each compiled by a process of its own, both loaded by a third: f(3) is 30 and 23."""
     script = tmp_path / "same_names.py"

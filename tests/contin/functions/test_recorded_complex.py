@@ -38,6 +38,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("x", [0.7, 3.1, -1.3])
 def test_values_and_derivatives(name, x):

@@ -126,6 +126,7 @@ def in_segments(places, blocks):
     return Factorization(places, blocks, segments.share(len(blocks.local), 2**20))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("sparse", [False, True])
 @pytest.mark.parametrize("sizes", SIZES)
 def test_segments_agree_with_dense_and_have_the_same_bits_for_all_threads(sizes, sparse, monkeypatch):

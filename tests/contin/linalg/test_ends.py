@@ -82,6 +82,7 @@ def test_a_single_interval_has_no_inside():
     assert ends(1.0, 1)[1] is None
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("seed", range(200))
 def test_near_one_means_eigenvalues_near_one(seed):
     """Random matrices that are near to the identity, or nearly normal, or neither: against all eigenvalues, by LAPACK."""

@@ -18,6 +18,7 @@ def test_many_states_are_one_group():
     assert coupled_groups(np.eye(501, dtype=bool)) == [list(range(501))]
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("seed", range(100))
 def test_groups_against_powers_of_the_pattern(seed):
     """Of random patterns of up to 15 states: mutual reachability, and the number of states that are reached as the order."""

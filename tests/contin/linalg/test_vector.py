@@ -41,6 +41,7 @@ def subtract_products(target: Matrix, factors: Matrix, pivots: Matrix, length: i
     vector.subtract_products(at(target, 1, 2), at(factors, 1, 2), at(pivots, 1, 2), length, rows, count)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("width", "size"), [*itertools.product(WIDTHS, SIZES)])
 def test_subtract_products(width, size):
     target, factors, pivots = numbers(13, width), numbers(13, 9, seed=1), numbers(PANEL + 2, width + 5, seed=2)
@@ -180,6 +181,7 @@ def subtract_columns(target: Matrix, matrix: Matrix, vectors: Matrix, length: in
     vector.subtract_columns(at(target, 1, 0).address, at(matrix, 1, 2), at(vectors, 1, 0).address, length, rows)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_subtract_rows_and_columns(width):
     target, vectors, matrix = numbers(ENTRIES, LANES), numbers(ENTRIES, LANES, seed=1), numbers(14, width, seed=2)

@@ -77,6 +77,7 @@ def implicit(u, p):
 SINGULAR = np.array([[1.0, 0, 0], [0, 0, 0], [0, 0, 1]])
 
 
+@pytest.mark.full
 def test_a_singular_matrix(tmp_path):
     """s = mu on the cycle: radius, period, multiplier; d = -1 at the Hopf point, for which s = x^2 + y^2 to second order."""
     problem = AlgebraicProblem(implicit, ["x", "s", "y"], {"mu": -0.5}, mass=SINGULAR)

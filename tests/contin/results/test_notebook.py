@@ -158,6 +158,7 @@ def test_html_is_well_formed_and_lists_labelled_points(branch):
     assert contin.Branch()._repr_html_() == "<div><p><b>Branch</b> of 0 points</p></div>"
 
 
+@pytest.mark.full
 def test_points_and_diagrams_have_tables_in_notebooks(branch):
     fold = branch.labelled("LP")[0]
     root = ElementTree.fromstring(fold._repr_html_())

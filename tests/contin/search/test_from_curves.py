@@ -70,6 +70,7 @@ def roessler(u, p):
     return -u.y - u.z, u.x + p.a * u.y, 0.2 + u.z * (u.x - p.c)
 
 
+@pytest.mark.full
 def test_doubled_cycles(tmp_path):
     """From any point of a curve of period doublings: the doubled cycles, and the simple ones. From a file, too."""
     problem = contin.CycleProblem(roessler, ["x", "y", "z"], {"c": 2.0, "a": 0.2})
@@ -133,6 +134,7 @@ def test_doubled_cycles_of_a_map():
     assert sorted(double[-1].system.states(double[-1].x).ravel()) == pytest.approx(places, abs=1e-10)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("b, way", [(-0.5, 1), (0.5, -1)])
 def test_the_direction_is_that_of_the_normal_form(b, way):
     """r' = r (m + b r^2 - r^4): cycles with m = r^4 - b r^2 on both sides of the generalized Hopf point at b = 0."""

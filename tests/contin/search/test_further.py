@@ -23,6 +23,7 @@ def line_and_circle():
     return AlgebraicProblem(lambda u, p: ((u.x - p.a) * ((u.x - 4) ** 2 + (p.a - 1) ** 2 - 0.25),), ["x"], {"a": 0.0})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("values", [[1.0], [0.6, 1.2], [0.0, 0.7, 1.0, 1.4, 2.0]])
 def test_an_isola_is_found_and_closed(values):
     found = diagram(solve(line_and_circle(), [0.0]), free=["a"], limits={"a": (0, 2)}, search=Search(values))
@@ -38,6 +39,7 @@ def test_an_isola_is_found_and_closed(values):
         assert attempts == tried.guesses.total() + len(tried.found)
 
 
+@pytest.mark.full
 def test_the_isola_of_a_reactor():
     """Cubic autocatalysis with decay (Gray and Scott 1983): k^2 t^2 + (2 k - 1/4) t + 1 = 0 at its folds; washout is apart."""
     k = 0.05
@@ -58,7 +60,7 @@ def cubic():
     return AlgebraicProblem(lambda u, p: (p.a * u.x - u.x**3 + p.e,), ["x"], {"a": -1.0, "e": 0.1})
 
 
-@pytest.mark.sample(3)  # each imperfection, each seed
+@pytest.mark.sample(1)  # each imperfection, each seed
 @pytest.mark.parametrize("e, seed", [((0.3, 0.1, 1e-3)[(seed + k) % 3], seed) for seed in range(3) for k in range(3)])
 def test_the_other_branch_of_an_imperfect_pitchfork(e, seed):
     values = [-0.5, 0.0, 1.0, 1.7]
@@ -122,6 +124,7 @@ def shot(lam, load, most=12.0):
     return roots, sorted(ends(root)[2] for root in roots)
 
 
+@pytest.mark.full
 def test_a_disconnected_branch_of_a_boundary_value_problem():
     """A loaded beam: the branch from lam = 0 never meets the other one; shooting finds as many solutions."""
     beam = BoundaryValueProblem(
@@ -136,6 +139,7 @@ def test_a_disconnected_branch_of_a_boundary_value_problem():
         assert slopes == pytest.approx(shot(lam, 0.3)[0], abs=1e-6)
 
 
+@pytest.mark.full
 def test_the_upper_solution_that_the_limits_part_from_the_lower_one():
     """Bratu's problem on two segments; u is 2 log cosh(theta / 4) in the middle, with theta = sqrt(2 lam) cosh(theta / 4)."""
     walls = [contin.Segment(lambda s, u, p: (u.v, -p.lam * math.exp(u.u) / 4), ["u", "v"])] * 2
@@ -159,6 +163,7 @@ def carrier():
     )  # fmt: skip
 
 
+@pytest.mark.full
 def test_all_solutions_of_carriers_equation():
     """Also modulo the reflection of t, of which the means are invariants: six, two of which are those of a pair."""
     start = solve(carrier(), [0, 0])
@@ -173,6 +178,7 @@ def test_all_solutions_of_carriers_equation():
     assert len(reflected.branches) < len(everything.branches)
 
 
+@pytest.mark.full
 def test_states_of_an_energy():
     """The loaded beam by its energy: multipliers are unknowns, too; the state of the other side is a minimum as well."""
     beam = contin.VariationalProblem(
@@ -250,6 +256,7 @@ def test_wrong_searches(search, said):
     assert said in str(told.value)
 
 
+@pytest.mark.full
 def test_cycles_are_not_searched():
     circles = contin.CycleProblem(
         lambda u, p: (p.mu * u.x - u.y - u.x * (u.x**2 + u.y**2), u.x + p.mu * u.y - u.y * (u.x**2 + u.y**2)),

@@ -99,6 +99,7 @@ def test_generalized_hopf():
         assert point["lyapunov"] == pytest.approx(point["b"], abs=1e-10)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-4, 1e9])
 @pytest.mark.parametrize("b", [-0.37, -0.51])
 def test_generalized_hopf_in_other_units(size, b):

@@ -78,6 +78,7 @@ def test_what_solve_says_of_a_value_is_a_failure():
     assert not rows[0].failure and rows[1].failure == "parameter 'c' is not one of a, b"
 
 
+@pytest.mark.full
 def test_branches_come_back_from_processes():
     def branch(problem, values):
         return contin.trace(contin.solve(problem, [1.0], values), free=["a"], direction=-1, limits={"a": (-1, 50)})

@@ -68,6 +68,7 @@ def test_bad_first_guesses(guess, options, said):
         solve(bratu(), guess, **options)
 
 
+@pytest.mark.full
 def test_where_newton_fails_the_sentence_says_what_helps():
     """Bratu's problem has no solution above lam = 3.5138; the advice works where it has one."""
     with pytest.raises(ConvergenceError, match="give a guess closer to a solution; if there may be none at lam = 5, solve at"):

@@ -204,6 +204,7 @@ def test_sensitivities_of_a_branch_point_by_a_parameter_of_another_size():
     assert point.sensitivities()["b"]["a"] == pytest.approx(1e-6, rel=1e-9)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", ["a = critical", "a = 0.231", "a", "x = -1.1", "b = 1"])
 @pytest.mark.parametrize("label", ["UZ", "LP", "EX"])
 def test_a_users_name_names_no_quantity(name, label):
