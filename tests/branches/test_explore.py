@@ -60,12 +60,10 @@ def test_one_exact_point_of_each_law_is_that_of_the_model(tmp_path):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """Folder with m1_n2.h5 (with the index), and the diagrams fig12 and laws."""
+    """Folder with m1_n2.h5, with the index."""
     folder = tmp_path_factory.mktemp("explore")
-    silent = Display(silent=True)
-    run_scene(ClosedScene(title="</script> & <b>", m=1, n=2, stability=True), folder / "m1_n2.h5", silent)
-    for name, scene in (("fig12", FIG_12), ("laws", LAWS)):
-        assert run_many(parse(scene, "scene"), folder / name, silent) == "complete"
+    scene = ClosedScene(title="</script> & <b>", m=1, n=2, stability=True)
+    run_scene(scene, folder / "m1_n2.h5", Display(silent=True))
     return folder
 
 
@@ -80,9 +78,23 @@ def unstable_folds(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pages(results):
-    for name in ("m1_n2.h5", "fig12", "laws"):
-        assert main([str(results / name), "--out", str(results / f"{name.removesuffix('.h5')}.html")]) == 0
+    assert main([str(results / "m1_n2.h5"), "--out", str(results / "m1_n2.html")]) == 0
     return results
+
+
+@pytest.fixture(scope="module")
+def diagrams(pages):
+    """The same folder, with the diagrams fig12 and laws, and their pages."""
+    for name, scene in (("fig12", FIG_12), ("laws", LAWS)):
+        assert run_many(parse(scene, "scene"), pages / name, Display(silent=True)) == "complete"
+        assert main([str(pages / name), "--out", str(pages / f"{name}.html")]) == 0
+    return pages
+
+
+@pytest.fixture(params=["m1_n2", *(pytest.param(name, marks=pytest.mark.full) for name in ("fig12", "laws"))])
+def page(request):
+    """Each page."""
+    return request.getfixturevalue("pages" if request.param == "m1_n2" else "diagrams") / f"{request.param}.html"
 
 
 def data_of(page):
@@ -124,13 +136,13 @@ def decoded(branch):
 # --- what the page holds ------------------------------------------------------------------------------------------
 
 
-def test_page_is_whole_and_small(pages):
-    for name in ("m1_n2", "fig12", "laws"):
-        text = (pages / f"{name}.html").read_text(encoding="utf-8")
-        assert len(text.encode()) < 2e6
-        assert "Permission is hereby granted, free of charge" in text  # the licence of plotly.js
-        assert "{{" not in text.split('<script type="application/json"')[0]
-    assert "<h1>&lt;/script&gt; &amp; &lt;b&gt;</h1>" in (pages / "m1_n2.html").read_text(encoding="utf-8")
+def test_page_is_whole_and_small(page):
+    text = page.read_text(encoding="utf-8")
+    assert len(text.encode()) < 2e6
+    assert "Permission is hereby granted, free of charge" in text  # the licence of plotly.js
+    assert "{{" not in text.split('<script type="application/json"')[0]
+    if page.stem == "m1_n2":
+        assert "<h1>&lt;/script&gt; &amp; &lt;b&gt;</h1>" in text
 
 
 def test_columns_are_those_of_the_file(pages):
@@ -145,12 +157,13 @@ def test_columns_are_those_of_the_file(pages):
     assert [circle["m"] for circle in family["circles"]] == [1, 3]
 
 
-def test_shapes_are_the_kept_solutions(pages):
+@pytest.mark.full
+def test_shapes_are_the_kept_solutions(diagrams):
     """Every kept solution of Fig. 12, at the end of the domain (a node of both), within `TOLERANCE` of its channel."""
-    (family,) = data_of(pages / "fig12.html")["families"]
+    (family,) = data_of(diagrams / "fig12.html")["families"]
     assert len(family["branches"]) == 18
     for about in family["branches"]:
-        branch = read_branch(pages / "fig12" / about["file"])
+        branch = read_branch(diagrams / "fig12" / about["file"])
         found = decoded(about)
         assert len(found) == len(branch.points)
         allowed = 1.5 * TOLERANCE * np.abs(found).max(axis=(0, 1))
@@ -161,17 +174,17 @@ def test_shapes_are_the_kept_solutions(pages):
             assert (np.abs(found[point, -1] - end) < allowed).all()
 
 
-def test_shapes_between_kept_solutions_are_those_of_a_run_that_keeps_all(results, tmp_path):
+@pytest.mark.parametrize("m, n, nu", [(7, 1, -0.1), pytest.param(1, 3, 0.3, marks=pytest.mark.full)])
+def test_shapes_between_kept_solutions_are_those_of_a_run_that_keeps_all(m, n, nu, tmp_path):
     """(7, 1) at nu = -.1, which cannot be integrated from S = 0, and (1, 3), with two folds: every point, and every tenth."""
-    for m, n, nu in ((7, 1, -0.1), (1, 3, 0.3)):
-        files = []
-        for stride in (1, 10):
-            files.append(tmp_path / f"{m}{n}{stride}.h5")
-            run_scene(ClosedScene(m=m, n=n, nu=nu, stride=stride), files[-1], Display(silent=True))
-        every, tenth = (shapes(read_branch(path)) for path in files)
-        assert every.shape == tenth.shape
-        assert (np.abs(every - tenth).max(axis=(0, 1)) < TOLERANCE * np.abs(every).max(axis=(0, 1))).all()
-        assert None not in solutions(read_branch(files[1]))
+    files = []
+    for stride in (1, 10):
+        files.append(tmp_path / f"{stride}.h5")
+        run_scene(ClosedScene(m=m, n=n, nu=nu, stride=stride), files[-1], Display(silent=True))
+    every, tenth = (shapes(read_branch(path)) for path in files)
+    assert every.shape == tenth.shape
+    assert (np.abs(every - tenth).max(axis=(0, 1)) < TOLERANCE * np.abs(every).max(axis=(0, 1))).all()
+    assert None not in solutions(read_branch(files[1]))
 
 
 def test_shapes_after_the_last_kept_solution(results):
@@ -204,17 +217,17 @@ def test_columns_are_packed_without_loss():
 
 
 @pytest.mark.full
-def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(results, monkeypatch, capsys, tmp_path):
+def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(diagrams, monkeypatch, capsys, tmp_path):
     """Of six materials four keep their shapes, if the limit is two thirds of the size of all; the first is among them."""
-    whole = gather_module.gather([str(results / "laws")])
+    whole = gather_module.gather([str(diagrams / "laws")])
     assert gather_module.left_out(whole) == []
     sizes = [sum(gather_module._size(branch[name]) for family in whole["families"] for branch in family["branches"])
              for name in ("columns", "shapes")]  # fmt: skip
     monkeypatch.setattr(gather_module, "_MOST_BYTES", sizes[0] + 2 * sizes[1] // 3)
-    assert main([str(results / "laws"), "--out", str(tmp_path / "page.html")]) == 0
+    assert main([str(diagrams / "laws"), "--out", str(tmp_path / "page.html")]) == 0
     data = data_of(tmp_path / "page.html")
     missing = gather_module.left_out(data)
-    assert len(missing) == 2 and all((results / "laws" / branch["path"]).exists() for branch in missing)
+    assert len(missing) == 2 and all((diagrams / "laws" / branch["path"]).exists() for branch in missing)
     assert data["families"][0]["branches"][0]["shapes"] is not None
     assert "the shapes of 2 branches" in capsys.readouterr().out
     if not CHROMIUM:
@@ -234,7 +247,8 @@ def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(results, m
         browser.close()
 
 
-def test_only_folds_of_stable_strips_have_a_way_down(pages, unstable_folds, results, monkeypatch):
+@pytest.mark.full
+def test_only_folds_of_stable_strips_have_a_way_down(diagrams, unstable_folds, monkeypatch):
     """That of (1, 2) ends on the triple loop; those of (1, 3), and pages without the index or of very many files, have none."""
 
     def ways(data):
@@ -242,25 +256,28 @@ def test_only_folds_of_stable_strips_have_a_way_down(pages, unstable_folds, resu
             mark["way"] for family in data["families"] for one in family["branches"] for mark in one["marks"] if "way" in mark
         ]
 
-    (way,) = ways(data_of(pages / "m1_n2.html"))
+    (way,) = ways(data_of(diagrams / "m1_n2.html"))
     assert [end["name"] for end in way["ends"]] == ["3-covered circle"]
     assert way["kappa_n"] == pytest.approx(past(4.0756675353, 1), abs=1e-9)
     energies = column(way, "energy")
     assert (np.diff(energies) < 0).all() and energies[-1] == pytest.approx(way["ends"][0]["energy"], abs=1e-2)
-    assert ways(data_of(unstable_folds)) == ways(data_of(pages / "fig12.html")) == []
+    assert ways(data_of(unstable_folds)) == ways(data_of(diagrams / "fig12.html")) == []
     monkeypatch.setattr(gather_module, "_SLOW", 0)
-    assert ways(gather_module.gather([str(results / "m1_n2.h5")])) == []
+    assert ways(gather_module.gather([str(diagrams / "m1_n2.h5")])) == []
 
 
-def test_families_by_law_and_nu(results):
-    data = gather([str(results / "laws"), str(results / "m1_n2.h5")])
+@pytest.mark.full
+def test_families_by_law_and_nu(diagrams):
+    data = gather([str(diagrams / "laws"), str(diagrams / "m1_n2.h5")])
     found = [(family["law"], family["nu"], len(family["branches"])) for family in data["families"]]
     assert found[:2] == [("ribbon", 0.1, 1), ("ribbon", 0.3, 2)]
     assert found[2:] == [(law, nu, 1) for law in ("flat rod", "isotropic rod") for nu in (0.1, 0.3)]
 
 
-@pytest.mark.parametrize("what", ["missing", "foreign", "scene", "empty", "damaged", "page", "folder"])
-def test_bad_input_is_one_sentence(what, results, tmp_path, capsys):
+@pytest.mark.parametrize(
+    "what", ["missing", "foreign", "scene", "empty", pytest.param("damaged", marks=pytest.mark.full), "page", "folder"]
+)
+def test_bad_input_is_one_sentence(what, results, tmp_path, capsys, request):
     given, out = tmp_path / f"{what}.h5", tmp_path / "page.html"
     if what == "foreign":
         given.write_text("not HDF5")
@@ -269,7 +286,7 @@ def test_bad_input_is_one_sentence(what, results, tmp_path, capsys):
     elif what == "empty":
         given.mkdir()
     elif what == "damaged":
-        shutil.copytree(results / "laws", given)
+        shutil.copytree(request.getfixturevalue("diagrams") / "laws", given)
         next(given.glob("*.h5")).unlink()
     elif what in ("page", "folder"):
         given = results / "m1_n2.h5"
@@ -300,19 +317,19 @@ def browser(tmp_path_factory):
 
 
 @needs_chromium
-@pytest.mark.parametrize("name", ["m1_n2", *(pytest.param(name, marks=pytest.mark.full) for name in ("fig12", "laws"))])
-def test_page_draws_without_errors(name, pages, browser):
-    browser.open(pages / f"{name}.html")
+def test_page_draws_without_errors(page, browser):
+    browser.open(page)
     assert browser.colours("#diagram") > 20
     assert browser.colours("#ribbon") > 200  # a lit surface
     assert browser.errors == []
     assert {url.partition(":")[0] for url in browser.requests} <= {"file", "data", "blob"}  # nothing from a network
-    if name != "fig12":
+    if page.stem != "fig12":
         return  # the longest legend is in Fig. 12
-    browser.open(pages / f"{name}.html", width=380, height=800)
+    browser.open(page, width=380, height=800)
     assert browser.js("document.documentElement.scrollWidth") <= 380  # nothing sticks out of a narrow screen
 
 
+@pytest.mark.full
 @needs_chromium
 def test_page_opens_at_a_computed_point_and_stays_where_it_is(pages, browser):
     """No column is offered against itself, and what is below the strip does not move when another point is chosen."""
@@ -327,6 +344,7 @@ def test_page_opens_at_a_computed_point_and_stays_where_it_is(pages, browser):
         assert browser.js(places) == pytest.approx(before, abs=2)
 
 
+@pytest.mark.full
 @needs_chromium
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_words_can_be_read(theme, pages, browser):
@@ -358,6 +376,7 @@ def test_words_can_be_read(theme, pages, browser):
     assert len(found) > 60 and [(words, ratio) for words, ratio in found if ratio < 4.5] == []
 
 
+@pytest.mark.full
 @needs_chromium
 def test_page_draws_without_webgl(pages, browser):
     blind = browser.call("Page.addScriptToEvaluateOnNewDocument", source=WITHOUT_WEBGL)["identifier"]
@@ -407,15 +426,14 @@ def distances_of(shape, n):
     return distances(np.column_stack([x, np.zeros((n, 9)), np.interp(S, shape.arclength, shape.eta)]))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @needs_chromium
-@pytest.mark.parametrize("name", ["m1_n2", "fig12", "laws"])
-def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
+def test_unfolded_strips_close_and_have_the_length(page, browser):
     """At points and between: the last station is as far from the first as any other from the next, L / stations.
 
     Within 5 % of that distance, 8e-4 L / 2 pi: mirrors and copies multiply the error of the frame at the end, 5e-5, by ten.
     """
-    browser.open(pages / f"{name}.html")
+    browser.open(page)
     gaps = browser.js("""explore.families.flatMap(({branches}) => branches.flatMap((branch) => [0, 0.3, 0.77, 1].map((part) => {
         const strip = branch.strip(part * (branch.size - 1)), n = strip.length / 13, lengths = [];
         for (let k = 0; k < n; k++) {
@@ -427,6 +445,7 @@ def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
     assert max(map(abs, gaps)) < 0.05  # chords are shorter than arcs, and between points states are interpolated
 
 
+@pytest.mark.full
 @needs_chromium
 def test_play_keys_and_coexisting_states(pages, browser):
     branch = read_branch(pages / "m1_n2.h5")
@@ -459,8 +478,8 @@ def test_play_keys_and_coexisting_states(pages, browser):
 
 @needs_chromium
 @pytest.mark.full
-def test_material_can_be_switched(pages, browser):
-    browser.open(pages / "laws.html")
+def test_material_can_be_switched(diagrams, browser):
+    browser.open(diagrams / "laws.html")
     names = browser.js("[...document.getElementById('family').options].map((option) => option.text)")
     assert names[0] == "ribbon, ν = 0.1" and len(names) == 6
     browser.js(
@@ -537,9 +556,9 @@ def test_stable_is_solid_and_unstable_dashed(pages, browser):
 
 @needs_chromium
 @pytest.mark.full
-def test_a_link_shows_what_was_shown(pages, browser):
+def test_a_link_shows_what_was_shown(diagrams, browser):
     """The address holds the place and the controls; back and forward move between branches; a wrong address does no harm."""
-    browser.open(pages / "fig12.html")
+    browser.open(diagrams / "fig12.html")
     browser.js("""(() => {
         const set = (id, value, event) => { const e = document.getElementById(id); e.value = value; e[event](); };
         set('y', 'energy', 'onchange'); set('width', '6.5', 'oninput'); set('compare', 'exact ribbon', 'onchange');
@@ -558,7 +577,7 @@ def test_a_link_shows_what_was_shown(pages, browser):
     browser.until("explore.now.branch.id === 'ribbon_nu0.3_m1_n2'")
     browser.js("history.forward()")
     browser.until("explore.now.branch.id === 'ribbon_nu0.3_m3_n4'")
-    browser.open(pages / "fig12.html", address=link)
+    browser.open(diagrams / "fig12.html", address=link)
     assert browser.js(shown) == expected
     browser.js("location.hash = '#branch=absent&point=many&width=x&material=9&map=1,2&compare=nobody'")
     browser.until("explore.now.branch.id === 'ribbon_nu0.3_m1_n2'")
@@ -657,9 +676,9 @@ def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
 
 @pytest.mark.full
 @needs_chromium
-def test_compare_with_another_material(pages, browser):
+def test_compare_with_another_material(diagrams, browser):
     """The exact solution at the nu of the slider, and the branches of another material on the page, as thin lines."""
-    browser.open(pages / "laws.html")
+    browser.open(diagrams / "laws.html")
     choose = "(() => {{ const e = document.getElementById('{}'); e.value = '{}'; e.{}(); }})()"
     browser.js(choose.format("compare", "exact flat rod", "onchange"))
     browser.js(choose.format("nu", "0.1", "oninput"))
@@ -726,6 +745,7 @@ GO_TO_FOLD = "explore.go(explore.now.branch, explore.now.branch.marks.find(({kin
 FOLD_SHOWN = "[document.getElementById('story').textContent, document.getElementById('snap').hidden]"
 
 
+@pytest.mark.full
 @needs_chromium
 def test_let_it_snap_shows_the_descent(pages, browser):
     """From the fold of (1, 2) the strip comes down to the triple loop, as in the paper's experiments.
@@ -755,10 +775,11 @@ def test_let_it_snap_shows_the_descent(pages, browser):
     assert browser.errors == []
 
 
+@pytest.mark.full
 @needs_chromium
-def test_folds_say_no_more_than_was_computed(pages, unstable_folds, browser):
+def test_folds_say_no_more_than_was_computed(diagrams, unstable_folds, browser):
     """Without the index nothing is said of snapping; between two unstable sides nothing snaps, and nothing is offered."""
-    browser.open(pages / "fig12.html")
+    browser.open(diagrams / "fig12.html")
     browser.js(GO_TO_FOLD)
     story, hidden = browser.js(FOLD_SHOWN)
     assert story.endswith("At this fold the branch turns back.") and hidden
@@ -769,6 +790,7 @@ def test_folds_say_no_more_than_was_computed(pages, unstable_folds, browser):
     assert browser.errors == []
 
 
+@pytest.mark.full
 @needs_chromium
 def test_strip_as_a_solid(pages, browser):
     """Watertight, of volume length * width * thickness: 200 mm, 3 % of it, and 0.8 mm, the first values of the page."""
@@ -780,6 +802,7 @@ def test_strip_as_a_solid(pages, browser):
     assert mesh.volume == pytest.approx(200 * 6 * 0.8, rel=1e-3)
 
 
+@pytest.mark.full
 @needs_chromium
 def test_keyboard_touch_and_names(pages, browser):
     """The map takes the focus and shows it; at 390 px controls are 44 px high; every control has a name."""
@@ -884,6 +907,7 @@ def test_kinds_of_results_are_not_mixed(results, stored, tmp_path, capsys):
 # --- a stored branch in a notebook --------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_stored_branch_in_a_notebook(results):
     branch = read_branch(results / "m1_n2.h5")
     table = branch.to_pandas()

@@ -68,12 +68,22 @@ def test_the_arch_and_the_shape_of_an_s(searched):
         assert state.point["distance"] == pytest.approx(0.75, abs=1e-12)
 
 
+@pytest.mark.full
 def test_the_report(result, searched, monkeypatch):
     monkeypatch.setattr(further, "places", lambda *given: searched)
     lines = report(result, 16)
     assert lines[0] == "further states:" and lines[-1] == "  what no guess leads to is not found: there may be more"
     assert lines[1].startswith("  distance = 0.75 of stage 1: 1 known, ")
     assert "    energy 10.5515 (that of a known state), index 0" in lines and "    energy 21.1472, index 1" in lines
+
+
+def test_a_search_of_one_draw(result, monkeypatch):
+    """It is compared with the arch that the run has, whose energy is that of the other solver."""
+    (place,) = places(result, 1)
+    assert place.known[0].potential == pytest.approx(planar(lambda t: 1.2 * np.sin(2 * np.pi * t), 39.0), rel=1e-7)
+    monkeypatch.setattr(further, "places", lambda *given: [place])
+    lines = report(result, 1)
+    assert lines[0] == "further states:" and lines[1].startswith("  distance = 0.75 of stage 1: 1 known, ")
 
 
 @pytest.mark.parametrize("scene, option, said", [

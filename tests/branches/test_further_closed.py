@@ -53,6 +53,7 @@ def test_states_of_other_primary_branches(place):
     assert third.energy == pytest.approx(quadrature.energy, rel=1e-8)
 
 
+@pytest.mark.full
 def test_every_state_is_one_of_the_whole_loop(place):
     for state in place.found:
         assert state.solution.shape().closure() < 1e-8 and is_odd(state.solution)
@@ -77,6 +78,7 @@ def test_even_circles_have_states_of_their_own():
     assert points and not any(is_odd(Solution.of(point)) for point in points)
 
 
+@pytest.mark.full
 def test_the_report(path, place, monkeypatch):
     monkeypatch.setattr(further_closed, "places", lambda *given: [place])
     lines = report(path, [3.0], 8)

@@ -173,6 +173,7 @@ NAMES = sorted(path.stem for path in CONFIGS.glob("network_*.yaml"))
 QUICK = ("network_weight",)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=[pytest.mark.full, pytest.mark.hours]) for name in NAMES]
 )  # fmt: skip

@@ -64,6 +64,7 @@ def test_limits_are_told_in_the_scene_s_units(tmp_path):
         followed(f"{scene}stages: [{{follow: distance, to: 0.3, limits: {{distance: [0.1, 0.2]}}}}]\n", tmp_path)
 
 
+@pytest.mark.full
 def test_a_stage_starts_at_its_limit(tmp_path):
     """A stage that begins where another one has stopped is within limits that end there."""
     scene = f"{ARCH}stages: [{{follow: distance, to: 0.9}}, {{follow: distance, to: 0.93, limits: {{distance: [0.9, 1]}}}}]\n"

@@ -41,7 +41,7 @@ def computed(tmp_path_factory):
 
 
 #: Items that take ten seconds or more each.
-LONG = {"curves", "fig6", "fig7", "fig10", "fig11", "fig12", "fig12b", "snaps", "finite-width"}
+LONG = {"curves", "fig6", "fig7", "fig9", "fig10", "fig11", "fig12", "fig12b", "snaps", "finite-width"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name in LONG else name for name in ITEMS])

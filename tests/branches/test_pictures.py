@@ -283,6 +283,7 @@ def inside(line, box):
     return bool(((line > low + 1) & (line < high - 1)).all(axis=1).any())
 
 
+@pytest.mark.full
 def test_the_inset_shows_the_five_bifurcations_that_are_one_blob(pictures):
     (inset,) = pictures["ribbon"].axes[0].child_axes
     low, high = inset.get_xlim()

@@ -108,6 +108,7 @@ def test_the_estimate_converges(monkeypatch):
     assert "18 min so far, about 0 s to go" in progress.text()  # never negative
 
 
+@pytest.mark.full
 def test_the_estimate_of_many_branches_is_steady(monkeypatch, capsys):
     """600 branches on two processes; a branch (m, n) takes m n seconds, twice of that with a width, and 180 are merged.
 

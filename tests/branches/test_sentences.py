@@ -75,7 +75,7 @@ def test_a_reason_of_another_kind_is_kept():
     assert advice.no_state(run, "a = 1") is run.stop
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("scene", "sentence"),
     [

@@ -109,16 +109,12 @@ AGREEMENT = {
     (7, 2, 0.1): 1, (7, 2, 0.2): 1, (7, 2, 0.3): 1, (7, 2, 0.4): 0,
     (7, 3, 0.1): 1, (7, 3, 0.2): 1, (7, 3, 0.3): 1, (7, 3, 0.4): 0,
 }  # fmt: skip
-#: Those that are computed without --full.
-QUICK = {(7, 1, 0.3)}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("m", "n", "nu"), AGREEMENT)
-def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
+def test_the_index_changes_where_the_half_loop_branches(m, n, nu):
     """Within the errors of both: located by an eigenvalue on the cell, and as a branch point of the half loop's equations."""
-    if (m, n, nu) not in QUICK and not request.config.getoption("--full"):
-        pytest.skip("with --full only")
     system, x, tangent = primary_branch(RIBBON, m, n, nu, 10, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, events=SymmetryWatch(RIBBON, system, x).monitors)
     found = trace(point_of(system, x), settings, tangent=tangent).labelled(LABEL)

@@ -13,7 +13,7 @@ from hypothesis import given, settings  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 #: A part of what the profile has (tests/conftest.py): 5, and 25 with --full.
-FEW = settings(max_examples=settings().max_examples // 12)
+FEW = settings(max_examples=max(5, settings().max_examples // 12))
 
 numbers = st.one_of(
     st.integers(), st.floats(), st.booleans(), st.sampled_from([10**400, -(10**400), np.float64(math.nan), np.int64(2), 1 + 2j])

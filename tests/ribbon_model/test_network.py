@@ -122,7 +122,7 @@ def test_a_portal_frame(section, foot, known):
         np.testing.assert_allclose(moment, 0, atol=1e-8)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_right_angle_frame_under_end_moments(direction):
     """M = pi sqrt(B1 C) / L where the legs do not bend in their plane: 622.2080872197 N mm for the data of the literature."""
@@ -210,7 +210,7 @@ LAWS = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("cuts", [(0.37,), (0.2, 0.65)])
 def test_a_cut_by_rigid_joints_changes_nothing(name, cuts):

@@ -52,7 +52,7 @@ def shot(turn: float) -> float:
     return end(z)[-1]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("phase", ["", "spin", "shift, right", "shift, left", "shift, two waves"])
 def test_a_cut_ring_with_an_end_turned(phase):
     """No symmetry moves it: every phase is a load, which is said, with its multiplier. Without one the energy is right."""
@@ -77,6 +77,7 @@ def greenhill(order: int) -> float:
     return (1.5 * brentq(lambda z: jv(-1 / 3, z), z[at], z[at + 1])) ** 2
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("load", ["force_tangent", "weight"])
 def test_branch_points_that_a_phase_makes(load):
     """An isotropic column buckles in both planes (Euler, Greenhill); in one the phase moves the loads: no label, a note."""

@@ -129,7 +129,7 @@ def run_until(start: Point, free: Sequence[str], labels: int, **settings) -> Bra
 
 
 #: Cases that take two seconds or more, most of it compiling.
-LONG = {"grid of 3 x 3", "Hodgkin-Huxley", "kar", "Cahn-Hilliard", "beam on a foundation, double"}
+LONG = {"grid of 3 x 3", "spb: gam", "Hodgkin-Huxley", "kar", "Cahn-Hilliard", "beam on a foundation, double"}
 
 
 def bank(*names: str) -> list:

@@ -91,6 +91,7 @@ def test_the_error_of_a_normal_form_does_not_depend_on_what_was_computed_before(
     assert before.details["normal_form_error"] == after.details["normal_form_error"]
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_branch_points_of_a_boundary_value_problem_in_python():
     """lam = (k pi)^2: nested differences take shorter lengths at some places, and not at others."""

@@ -22,9 +22,9 @@ def test_some_in_other_units(name):
     assert complaints(name, 0) == {}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(SEEDS))
 @pytest.mark.parametrize("name", units.NAMES)
-def test_sizes_stated(name, seed, request):
-    if not request.config.getoption("--full"):
-        pytest.skip("the whole bank: with --full only")
+def test_sizes_stated(name, seed):
+    """The whole bank."""
     assert complaints(name, seed, stated=True) == {}

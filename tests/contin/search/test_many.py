@@ -33,7 +33,15 @@ def unsendable(problem, values):
     return (lambda: 0) if values["a"] > 38 else 0
 
 
-@pytest.fixture(scope="module", params=["here", "processes", "threads", "pool", "multiprocessing", "Dask"])
+KINDS = [
+    "here",
+    "processes",
+    "threads",
+    *(pytest.param(kind, marks=pytest.mark.full) for kind in ("pool", "multiprocessing", "Dask")),
+]
+
+
+@pytest.fixture(scope="module", params=KINDS)
 def workers(request):
     """Everything that `batch` takes for workers."""
     if request.param in ("here", "processes"):
