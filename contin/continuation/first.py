@@ -17,6 +17,7 @@ from contin.core.step import ROUNDS, Reason, State, Stop, standing_at
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.draws import DRAWS, generator
 from contin.errors import ConvergenceError
+from contin.events.corner import ways, with_outcomes, zeros
 from contin.events.folds import growing
 from contin.levels import APART, LOCATED
 from contin.text import value_names
@@ -59,6 +60,16 @@ def corrected_first(system: Discretization, x: Array, settings: Settings, primar
     system, x, linear = _accurate(system, x, linear, settings, primary)
     unit = settings.direction * growing(system, x, linear.tangent, primary, settings.newton)
     return _with_sign(standing_at(system, x, unit, settings.step))
+
+
+def frozen(state: State) -> State:
+    """Return a first state with the outcomes of conditions; at a corner those of the way nearest to its tangent."""
+    system = with_outcomes(state.system, state.x)
+    every = ways(system, state.x, zero)[0] if (zero := zeros(system, state.x)) else []
+    if not every:
+        return dataclasses.replace(state, system=system)
+    way = max(every, key=lambda way: inner(system, way.tangent, state.tangent))
+    return _with_sign(dataclasses.replace(state, system=way.system, tangent=way.tangent, singular=False))
 
 
 def _with_sign(state: State) -> State:

@@ -190,7 +190,7 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
     stability = Stability() if index is None else system.stability(found)
     return Point(
-        str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength,
+        str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system.thawed, arclength,
         trial.iterations, trial.newton_error, found.errors or {}, found.details,
         stability.index, stability.nullity, change, stability.breaks,
         *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,

@@ -19,7 +19,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.continuation.failure import ended, met, no_convergence, runs_away, shorter_steps
-from contin.continuation.first import begins_outside, corrected_first, on_branch
+from contin.continuation.first import begins_outside, corrected_first, frozen, on_branch
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
 from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told
@@ -32,9 +32,10 @@ from contin.core.step import Reason, State, Stop, predict, up_to_limits
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
+from contin.events.corner import conditions, corner_at
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
-from contin.levels import ROUGH
+from contin.levels import APART, ROUGH
 from contin.results.point import Point
 from contin.text import exact_text
 
@@ -84,10 +85,13 @@ class Continuation:
         self.primary = settings.primary or system.free[0]
         self._steps = Steps(settings, self.primary, fold(self.primary) if settings.folds else None)
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
+        self._conditions = conditions(self.state.system)
+        if self._conditions:
+            self.state = frozen(self.state)
         self._own = [test for test in self.state.system.events() if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
         general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
-        self._tests = [*general, *self._own]
+        self._tests = [*general, *self._conditions, *self._own]
         self._meshes = MeshPolicy(self._steps, general)
         self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
         if conserved := getattr(system.solution.problem, "conserved", ""):
@@ -97,8 +101,9 @@ class Continuation:
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
         self._judge = Judge(self.start, settings, self._tests, general, self._steps.fold, self._steps.sense)
         self._handed: Handed | None = None  # the next step, where a kernel has made it
+        self._left: list[Array] = []  # corners, each with the tangent of the way on
         self._adapted = -1  # regular points at which the mesh was looked at last
-        self._lanes = Lanes(self.start, self._tests, self._own)
+        self._lanes = Lanes(self.start, self._tests, [*self._conditions, *self._own])
 
     @property
     def settings(self) -> Settings:
@@ -216,7 +221,7 @@ class Continuation:
             return
         self._accuracy = accuracy_of(step.end)
         arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
-        special = within_limits(arc, special, self._limits)
+        special = within_limits(arc, special, [*self._limits, *self._conditions])
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
@@ -224,6 +229,9 @@ class Continuation:
         if end == len(special):
             self._notes.doubts(self._judge.index, arc, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
+            if point.test in self._conditions:
+                yield from self._turn(point, arc)
+                return
             if point.stop is not None:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
                 point = with_details(point, self.stop)
@@ -238,6 +246,27 @@ class Continuation:
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
+
+    def _turn(self, point: SpecialPoint, arc: Arc) -> Iterator[Point]:
+        """Yield a corner, and go on behind it."""
+        assert point.test is not None
+        state, settings, came = arc.state, self.settings, point.trial.tangent
+        came = came if np.isfinite(came).all() else state.tangent
+        corner, ways = corner_at(point, came, self._conditions.index(point.test), self.primary)
+        if corner is not None:
+            self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=point.test.name)
+            yield self._point(corner, state, accuracy=self._accuracy)
+        if ways:
+            at, accepted = corner or point, state.accepted + 1
+            behind = on_branch(ways[0].system, at.trial.x, ways[0].tangent, settings, False)
+            numbers = {"arclength": state.arclength + at.at, "step": min(state.step, settings.step), "accepted": accepted}
+            self.go_on((dataclasses.replace(behind, **numbers), None))
+            left = np.concatenate([at.trial.x, ways[0].tangent])
+            if any(np.abs(left - known).max() < APART for known in self._left if known.size == left.size):
+                self.stop = Stop(Reason.KNOWN_BRANCH, "the run comes back to a corner, and the way on is known")
+            elif accepted >= settings.max_points:
+                self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[0])
+            self._left.append(left)
 
     def _takes_shorter_steps(self) -> bool:
         """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""

@@ -13,6 +13,7 @@ class Label(enum.StrEnum):
     FAILED = "MX"
     USER_ZERO = "UZ"
     EXTREMUM = "EX"
+    CORNER = "BC"
     FOLD = "LP"
     BRANCH_POINT = "BP"
     HOPF = "HB"

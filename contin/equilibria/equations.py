@@ -26,6 +26,7 @@ from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
 from contin.functions.batch import Batch, Columns
+from contin.functions.origin import source
 from contin.levels import CERTAIN, CORRECTED, LOCATED
 from contin.linalg.blocks import MANY, Factors
 from contin.linalg.matrices import DenseFactors, SparseFactors, eigenvalues, nearest, rightmost
@@ -155,7 +156,8 @@ class Algebraic(Spectral, System):
     @functools.cached_property
     def _residual(self) -> Any:
         """The residual, compiled."""
-        return self._batch("residual", ("residual",))
+        batch = self._batch("residual", ("residual",))
+        return batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
 
     @functools.cached_property
     def _by_unknowns(self) -> Columns:
@@ -166,7 +168,41 @@ class Algebraic(Spectral, System):
     def _by_states(self) -> tuple[Batch, Columns]:
         """The residual in the user's units, and columns of its derivatives by the states."""
         batch = self.problem.batch("residual")
+        batch = batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
         return batch, batch.columns([])
+
+    # --- conditions that unknowns decide -------------------------------------------------------------------------
+
+    @functools.cached_property
+    def conditions(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What the user has written for each; none of a map, and with a given Jacobian."""
+        batch = self.problem.batch("residual")
+        if type(self) is not Algebraic or self.problem.jacobian is not None:
+            return ()
+        return tuple(source(batch, place) for place in batch.conditions(self._free))
+
+    def with_sides(self, sides: Array) -> Algebraic:
+        """Return the same with frozen outcomes; with none, the equations as they are."""
+        other = self._with()
+        other.sides = sides
+        return other
+
+    @functools.cached_property
+    def thawed(self) -> Algebraic:
+        """The equations as they are."""
+        return self.with_sides(np.empty(0)) if self.sides.size else self
+
+    def numbers(self, x: Array) -> tuple[Array, Array]:
+        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
+        batch = self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
+        given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
+        values, slopes = batch.jacobian(*given, batch.columns(self._free))
+        return values[0], slopes[0]
+
+    def slopes(self, x: Array) -> Array:
+        """Return F_x, shape (equations, size)."""
+        jacobian = self._jacobian(x)[1]
+        return np.asarray(jacobian.toarray() if self.is_sparse else jacobian)
 
     @functools.cached_property
     def is_sparse(self) -> bool:
@@ -397,7 +433,9 @@ class Algebraic(Spectral, System):
     def _with(self, **changes: Any) -> Algebraic:
         """Return the same with other free parameters, parameters or scales."""
         kept = {"free": self.free, "parameters": dict(zip(self.problem.parameters, self.parameters)), "scales": self.scales}
-        return type(self)(self.problem, **{**kept, **changes})
+        other = type(self)(self.problem, **{**kept, **changes})
+        other.sides = self.sides if other.free == self.free else other.sides
+        return other
 
     def carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns to another system of this problem."""

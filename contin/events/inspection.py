@@ -401,7 +401,7 @@ class Returned(NamedTuple):
 
 def returned(start: Start, before: Trial, trial: Trial, step: float) -> Returned | None:
     """Return where a step passes the first point of a run, which it may leave aside; None where it certainly does not."""
-    if _is_elsewhere(start, before, trial, step):
+    if _is_elsewhere(start, before, trial, step) or not np.array_equal(start[0].sides, trial.system.sides):
         return None
     system, (home, x, tangent) = trial.system, start
     if home is not system:

@@ -19,7 +19,7 @@ import functools
 import time
 import warnings
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,8 +30,9 @@ from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import InterpretedWarning, ProblemError, warn
 from contin.functions import derivatives, round_off
 from contin.functions.interpreter import LANES, Loaded, load, run
+from contin.functions.outcomes import Outcomes, frozen
 from contin.functions.program import Inputs, Program, Slope, program
-from contin.functions.recording import checked, record, sized
+from contin.functions.recording import Recording, checked, record, sized
 from contin.functions.signature import ABSENT, Signature, UserFunction
 from contin.functions.tape import Number, Unrecordable
 from contin.threads import PARTS
@@ -81,19 +82,41 @@ class Recorded:
         self.kept: dict[Hashable, Any] = {}
         self._functions, self._signature = functions, signature
         self._seconds: dict[int, float] = {}  # a point takes, by the number of instructions
-        self._sizes: Array | None = None  # by which inputs and values are divided, if they are
+        self._values, self._sides = len(self.recording.results), 0  # numbers of values that have sizes, and of frozen outcomes
+        self._behind: Array = np.empty(0)  # p: frozen outcomes, and sizes that inputs and values are divided by
 
     def sized(self, inputs: Array, values: Array) -> Recorded:
         """Return the same functions of inputs divided by sizes, with their values divided by theirs."""
         found: Recorded = copy.copy(self._once("divided", self._divided))
-        found._sizes = np.concatenate([inputs, values])
+        found._behind = np.concatenate([inputs, values])
         return found
 
     def _divided(self) -> Recorded:
         """Return what functions with sizes share."""
+        return self._of(sized(self.recording))
+
+    def _of(self, recording: Recording, sides: int = 0) -> Recorded:
         found = copy.copy(self)
-        found.recording, found.kept, found._seconds = sized(self.recording), {}, {}
+        found.recording, found.kept, found._seconds, found._sides = recording, {}, {}, sides
         return found
+
+    def outcomes(self, free: tuple[int, ...]) -> Outcomes:
+        """Return the functions with frozen outcomes of what states or ``free`` parameters decide."""
+        recording, states = self.recording, len(self._signature.states) * (1 + self._signature.ends)
+        moving = [*recording.inputs[:states], *(recording.inputs[states + slot] for slot in free)]
+        return self._once(("outcomes", free), lambda: frozen(recording.tape, recording.results, moving))
+
+    def frozen(self, free: tuple[int, ...], sides: Array) -> tuple[Recorded, Recorded]:
+        """Return the same functions with these outcomes, and the numbers that decide."""
+
+        def both() -> list[Recorded]:
+            found = self.outcomes(free)
+            recordings = [replace(self.recording, results=places) for places in (found.results, found.numbers)]
+            return [self._of(recording, len(found.numbers)) for recording in recordings]
+
+        functions, numbers = map(copy.copy, self._once(("frozen", free), both))
+        functions._behind = numbers._behind = np.concatenate([sides, self._behind])
+        return functions, numbers
 
     def is_current(self) -> bool:
         """Return whether all constants that the functions read still have the values that were recorded."""
@@ -132,8 +155,8 @@ class Recorded:
         out, jac = np.empty((count, values)), np.zeros((count, *shape)) if shape else _NO_JACOBIAN
         if request.order:
             v = np.concatenate([v[:count] if self._signature.ends else u[:, :0], *given], axis=1)
-        if self._sizes is not None:
-            p = np.concatenate([p, self._sizes])
+        if self._behind.size:
+            p = np.concatenate([p, self._behind])
         if count < _MANY:
             run(found, (t, u, v), p, out, jac)
         else:
@@ -155,8 +178,7 @@ class Recorded:
 
     def load(self, request: Request) -> Loaded:
         """Return the program as kernels run it."""
-        sizes = np.empty(0) if self._sizes is None else self._sizes
-        return load(self._made(request)[0], len(self._signature.parameters), sizes)
+        return load(self._made(request)[0], len(self._signature.parameters), self._behind)
 
     def function(self, places: Sequence[int]) -> Callable[[Array, Array, Array], Array]:
         """Return the function ``(t, u, p)`` of the values of operations on the tape, shape (points, places)."""
@@ -223,7 +245,7 @@ class Recorded:
         return places
 
     def _inputs(self, directions: int = 0, weights: bool = False) -> Inputs:
-        """Return where inputs are found: directions and weights stand behind v, sizes behind p."""
+        """Return where inputs are found: directions and weights stand behind v, outcomes and sizes behind p."""
         signature, count = self._signature, len(self.recording.results)
         states, parameters = len(signature.states), len(signature.parameters)
         ends = states if signature.ends else 0
@@ -231,7 +253,8 @@ class Recorded:
         slots += [("direction", number, slot) for number in range(directions) for slot in range(signature.inputs)]
         slots += [("weight", row) for row in range(count if weights else 0)]
         fixed: list[Hashable] = list(range(states + ends, states + ends + parameters))
-        fixed += [("size", number) for number in range(signature.inputs + count)]
+        fixed += [("side", number) for number in range(self._sides)]
+        fixed += [("size", number) for number in range(signature.inputs + self._values)]
         u, v, p = ({slot: place for place, slot in enumerate(group)} for group in (range(states), slots, fixed))
         return Inputs(u, v, p)
 
@@ -580,6 +603,19 @@ class Batch:
         found = copy.copy(self)
         found._own = self._own.sized(inputs, values)
         return found
+
+    def conditions(self, free: Sequence[int] | Indices) -> tuple[int, ...]:
+        """Return the places on the tape of the conditions that states or ``free`` parameters decide."""
+        return self.recorded.outcomes(tuple(map(int, free))).origins if self.recorded is not None else ()
+
+    def frozen(self, free: Sequence[int] | Indices, sides: Array) -> tuple[Batch, Batch]:
+        """Return the functions with ``sides``, 1 or -1 each, as outcomes of these conditions, and the numbers that decide."""
+        assert self.recorded is not None
+        made = copy.copy(self), copy.copy(self)
+        for batch, own in zip(made, self.recorded.frozen(tuple(map(int, free)), sides)):
+            batch._own, batch.count = own, len(own.recording.results)
+            vars(batch).pop("depends", None)
+        return made
 
     def is_current(self) -> bool:
         """Return whether all constants that the functions read still have the values that were recorded."""

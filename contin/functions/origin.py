@@ -46,7 +46,7 @@ def jump(batch: Batch, inputs: Sequence[int]) -> str:
     tape, places = recording.tape, recording.tape.needed(recording.results)
     reads = tape.reading(places, [recording.inputs[i] for i in inputs])
     jumps = [at for at in places if tape.operations[at].name in _JUMPS and reads[at]]
-    return _source(batch, jumps[0]) if jumps else ""
+    return source(batch, jumps[0]) if jumps else ""
 
 
 def _raised(place: Place) -> str:
@@ -89,7 +89,7 @@ def _from_tape(place: Place) -> str:
         what = "has no finite derivative" if has_values else "is not finite"
         shown = [f"{number.known:.6g}" for number in numbers]
         written = _WRITTEN.get(name, name + "({})").format(*shown) if len(shown) < 3 else name
-        where = _source(batch, at)
+        where = source(batch, at)
         return f"{written} {what} at {_named(place)}" + f" ({where})" * bool(where)
     return ""
 
@@ -138,7 +138,7 @@ class _Stopping(Tape):
         return place
 
 
-def _source(batch: Batch, place: int) -> str:
+def source(batch: Batch, place: int) -> str:
     """Return what the user has written for an operation, with its line; "" where that is not known."""
     try:
         record(batch.functions, batch.signature, _Stopping(place))

@@ -21,6 +21,7 @@ from contin.defining.special_points import BranchPointCurve, FoldCurve
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint
+from contin.events.corner import Corner
 from contin.events.labelled import finding_of
 from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
@@ -244,13 +245,15 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
     if len(x) != system.size:
         raise ProblemError("the file is of version 0.2, which kept one point of a map's cycle only: follow it again")
     system = system.referring_to(x, tangent)
-    details: BranchPoint | MultiplePoint | dict[str, float] | None = row["details"]
+    details: BranchPoint | MultiplePoint | Corner | dict[str, float] | None = row["details"]
     if row.get("imperfection") is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
     elif row.get("dimension") is not None:
         kernel, tangents = arrays[f"kernel{number}"], tuple(arrays[f"tangents{number}"])
         details = MultiplePoint(row["dimension"], kernel, x, tangents, row["continuum"], row.get("spread", 0.0))
+    elif row.get("corner") is not None:
+        details = Corner(row["corner"], tuple(arrays[f"tangents{number}"]), tuple(row["unstable"]))
     fields: dict[str, Any] = {name: tuple(value) if isinstance(value := row[name], list) else value for name in _FIELDS}
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(parameters=parameters, x=x, tangent=tangent, system=system, details=details, **fields)

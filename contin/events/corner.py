@@ -1,0 +1,224 @@
+"""Corners of a branch: where a number that decides a condition on states or parameters is zero, and the ways that leave.
+
+Along a step outcomes are frozen (`contin.functions.outcomes`): Newton's method and the tangent see smooth equations that go on
+beyond the corner, and each number that decides is a test function of them. At its zero every outcome of what is zero there is
+tried: with sides s, a direction d of the null space of that F_x is a way on where s_k dg_k.d >= 0 for all numbers g_k that are
+zero. Of continuous functions there is an even number of ways in all, so that one, three or five lead on: the branch goes on, or
+turns, or several leave. Where no way does, the equations jump, and the branch ends.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.labels import Label
+from contin.core.protocol import Discretization, inner
+from contin.core.trial import Event, Linearization, Trial, linearization
+from contin.errors import ConvergenceError
+from contin.events.arc import Arc, SpecialPoint
+from contin.events.branch_point import locate_branch_point
+from contin.events.labelled import Finding
+from contin.levels import APART, CERTAIN, CORRECTED, DOUBLED, LOCATED, ROUGH, TINY
+from contin.linalg.border import random_rows
+
+#: So many conditions that meet in one point are tried with all outcomes: 64.
+_MOST = 6
+
+
+#: Parts of a step at which numbers are looked at between its ends, and below which part of the larger one there they may pass
+#: zero twice; so many places are tried then.
+_PARTS, _NEAR, _LOOKS = (0.25, 0.5, 0.75), 0.1, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Corner(Finding):
+    """A point at which conditions change their outcomes.
+
+    Attributes
+    ----------
+    kind : str
+        "goes on", "fold" (the primary parameter turns), "several" (ways lead on) or "end", with the reason.
+    ways : tuple of ndarray
+        Unit tangents of the ways that lead on, the one nearest to the branch first.
+    unstable : tuple of int or None
+        Numbers of unstable eigenvalues before and, on the first way, behind it.
+    """
+
+    kind: str
+    ways: tuple[Array, ...]
+    unstable: tuple[int | None, int | None]
+    nullity = 0
+
+    @property
+    def is_branch_point(self) -> bool:  # type: ignore[override]
+        """Several ways lead on."""
+        return len(self.ways) > 1
+
+    @property
+    def leaving(self) -> tuple[Array, ...]:
+        """The ways."""
+        return self.ways
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What is stored, by name."""
+        return {"tangents": np.array(self.ways)}
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What is stored besides."""
+        return {"corner": self.kind, "unstable": self.unstable}
+
+
+class Way(NamedTuple):
+    """A way that leaves a corner: the system with its outcomes, and the unit tangent."""
+
+    system: Discretization
+    tangent: Array
+
+
+def conditions(system: Discretization) -> list[Event]:
+    """Return the test functions of conditions that unknowns decide: positive beyond the frozen outcome."""
+    return [_condition(name, k) for k, name in enumerate(system.conditions)]
+
+
+def _condition(name: str, k: int) -> Event:
+    def beyond(trial: Trial) -> float:
+        values, slopes = trial.system.numbers(trial.x)
+        return -float(trial.system.sides[k] * values[k]) - _level(slopes[k], trial.x, CERTAIN * CORRECTED)
+
+    def between(arc: Arc, _: object) -> list[SpecialPoint] | None:
+        if arc.passes(test):
+            return None
+        part = comes_near(test, arc.before, arc.trial)
+        for _ in range(_LOOKS if part else 0):
+            there = arc.low + part * (arc.step - arc.low), arc.near(arc.low + part * (arc.step - arc.low))
+            if there[1].value(test) >= 0:
+                return [arc.locate(test, (arc.low, arc.before), there)]
+            ends = np.array([end.value(test) for end in (arc.before, there[1], arc.trial)])
+            bend, slope, _ = np.polyfit([0.0, part, 1.0], ends, 2)
+            part = min(max(-slope / (2 * bend), 0.0), 1.0) if bend < 0 else 0.0
+        return []
+
+    test = Event(Label.CORNER, name, beyond, terminal=True, limit=True, search=between)
+    return test
+
+
+def comes_near(test: Event, before: Trial, trial: Trial) -> float:
+    """Return the part of a step at which a test function is largest, by the cubic through both ends; 0 if it is not near zero.
+
+    It may be positive inside where both ends are negative.
+    """
+    ahead = trial.x - before.x
+    length = np.sqrt(inner(trial.system, ahead, ahead))
+    a, b = length * before.tangent, length * trial.tangent
+    values = []
+    for s in _PARTS:
+        x = before.x + s * (a + s * (3 * ahead - 2 * a - b + s * (a + b - 2 * ahead)))
+        values.append(test.function(Trial(trial.system, x, before.linear)))
+    best = int(np.argmax(values))
+    return _PARTS[best] if values[best] > -_NEAR * max(abs(before.value(test)), abs(trial.value(test))) else 0.0
+
+
+def _level(slopes: Array, x: Array, part: float) -> float:
+    """Return by how much a number changes where the unknowns change by a ``part`` of 1 + their size."""
+    return part * float(np.abs(slopes) @ (1 + np.abs(x))) + TINY
+
+
+def with_outcomes(system: Discretization, x: Array, forced: Mapping[int, float] = MappingProxyType({})) -> Discretization:
+    """Return a system with the outcomes at x, some of them forced; later ones may depend on those before."""
+    sides = np.ones(len(system.conditions))
+    for k in range(len(sides)):
+        found = system.with_sides(sides.copy())
+        sides[k] = forced.get(k) or (1.0 if found.numbers(x)[0][k] >= 0 else -1.0)
+    return system.with_sides(sides) if len(sides) else system
+
+
+def zeros(system: Discretization, x: Array) -> list[int]:
+    """Return the conditions whose numbers are zero at x, and change beside it."""
+    values, slopes = system.numbers(x)
+    return [k for k, value in enumerate(values) if abs(value) <= _level(slopes[k], x, LOCATED) and slopes[k].any()]
+
+
+def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
+    """Return the ways that leave x with any outcomes of conditions, why some have none, and whether slopes jump."""
+    found, missing, slopes = list[Way](), "", list[Any]()
+    for sides in itertools.product((1.0, -1.0), repeat=len(zero)) if len(zero) <= _MOST else ():
+        there = with_outcomes(system, x, dict(zip(zero, sides)))
+        with np.errstate(all="ignore"):
+            jacobian = there.slopes(x)
+            if not np.isfinite(jacobian).all():
+                missing = "derivatives are not finite"  # as those of a root that begins there
+                continue
+            if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
+                missing = "the equations jump"
+                continue
+            slopes.append(jacobian)
+            tangents = _tangents(there, x)
+        rates = np.array(sides)[:, None] * there.numbers(x)[1][list(zero)]
+        still = LOCATED * np.linalg.norm(rates, axis=1)
+        for tangent in tangents:
+            if np.all(rates @ tangent >= -still) and not any(np.abs(tangent - way.tangent).max() < DOUBLED for way in found):
+                found.append(Way(there, tangent))
+    bends = any(np.abs(each - slopes[0]).max() > LOCATED * np.abs(slopes[0]).max() for each in slopes[1:])
+    return found, missing, bends
+
+
+def _tangents(system: Discretization, x: Array) -> list[Array]:
+    """Return the unit tangents at x, both ways; where two branches cross with these outcomes, those of both."""
+    row = random_rows(1, system.size)[0] * np.sqrt(system.weights)
+    beside = x + ROUGH * (1 + np.abs(x)) * np.sign(row)
+    least, largest = (np.linalg.svd(system.slopes(place), compute_uv=False) for place in (x, beside))
+    if least[-1] > LOCATED * largest[0]:
+        found = [linearization(system, x, row).tangent]
+    else:
+        try:
+            point = locate_branch_point(system, x)
+        except ConvergenceError:
+            return []
+        found = list(point.tangents) if np.abs(point.x - x).max() < APART * (1 + np.abs(x).max()) else []
+    return [sign * each for each in found for sign in (1, -1)]
+
+
+def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple[SpecialPoint | None, list[Way]]:
+    """Return the corner where the condition ``hit`` is zero, None where all is smooth there, and the ways that lead on.
+
+    ``came`` is the tangent of the branch before it.
+    """
+    system = point.trial.system
+    x = _polished(system, point.trial.x, hit)
+    zero = sorted({hit, *zeros(system, x)})
+    every, missing, bends = ways(system, x, zero)
+    on = {number: inner(system, way.tangent, came) for number, way in enumerate(every)}
+    leading = [every[number] for number in sorted(on, key=lambda number: -on[number]) if on[number] > APART - 1]
+    if len(leading) == 1 and not (missing or bends):
+        return None, leading
+    at = system.parameter_index(primary)
+    turns = len(leading) == 1 and leading[0].tangent[at] * came[at] < 0
+    kind = "fold" if turns else "goes on" if leading else f"end, {missing or 'no way leads on'}"
+    kind = "several" if len(leading) > 1 else kind
+    unstable = [each.unstable(x) for each in (system, *(way.system for way in leading[:1]))]
+    found = Corner(kind, tuple(way.tangent for way in leading), (unstable[0], unstable[-1]))
+    name = f"{' and '.join(system.conditions[k] for k in zero)}: {kind}"
+    there = Trial(system, x, Linearization(came, point.trial.sign))
+    return replace(point, trial=there, name=name, stop=None, details=found), leading
+
+
+def _polished(system: Discretization, x: Array, hit: int) -> Array:
+    """Return the point at which a number is zero."""
+    for _ in range(2):
+        values, slopes = system.numbers(x)
+        with np.errstate(all="ignore"):
+            residual, factors = system.linearize(x, (slopes[hit],))
+            moved = x - factors.solve(np.append(residual, values[hit]))
+        if not np.abs(moved - x).max() < APART * (1 + np.abs(x).max()):
+            return x  # beside it the equations are singular
+        x = moved
+    return x

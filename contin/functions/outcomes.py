@@ -1,0 +1,72 @@
+"""Functions with frozen outcomes: what a condition decides becomes an input, and the number that decides it a further value.
+
+``abs(x)`` becomes ``side * x`` and ``a < b`` becomes ``side < 0``, where ``side`` is 1 or -1: one program serves all outcomes,
+and with held sides the functions are smooth where they were not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+from contin.functions.tape import Tape
+
+
+class Outcomes(NamedTuple):
+    """Functions with outcomes as inputs ``("side", k)``, by places on their tape.
+
+    Attributes
+    ----------
+    results : tuple of int
+        The functions.
+    numbers : tuple of int
+        The numbers whose signs decide: they may depend on the outcomes before them. g and -g are one.
+    origins : tuple of int
+        The conditions as they are recorded.
+    """
+
+    results: tuple[int, ...]
+    numbers: tuple[int, ...]
+    origins: tuple[int, ...]
+
+
+def frozen(tape: Tape, results: Sequence[int], moving: Collection[int]) -> Outcomes:
+    """Return functions in which every ``abs``, ``sign`` and comparison that depends on ``moving`` inputs is decided by a side.
+
+    Conditions inside of what is found by iteration stay as they are.
+
+    Examples
+    --------
+    >>> tape = Tape()
+    >>> x = tape.input(0)
+    >>> found = frozen(tape, [abs(x - 1).place], [x.place])
+    >>> tape.lines([*found.results, *found.numbers], {x.place: "x", tape.input(("side", 0)).place: "side"})
+    ['(x - 1) * side', 'x - 1']
+    """
+    moves, zero = tape.reading([*results, *moving], moving), tape.constant(0.0)
+    moved: dict[int, int] = {}
+    known: dict[int, int] = {}
+    numbers, origins = list[int](), list[int]()
+
+    def side(number: int, origin: int) -> int:
+        name, operands, _ = tape.operations[number]
+        opposite = {tape.at("neg", (number,)), tape.at("sub", operands[::-1]) if name == "sub" else number}
+        for other in opposite & known.keys():
+            return known[other] if other == number else tape.at("neg", (known[other],))
+        if number not in known:
+            known[number] = tape.input(("side", len(numbers))).place
+            numbers.append(number)
+            origins.append(origin)
+        return known[number]
+
+    for place in tape.needed(results):
+        name, operands, data = tape.operations[place]
+        new = tuple(moved[operand] for operand in operands)
+        if moves[place] and name in ("lt", "le"):
+            moved[place] = tape.at("lt", (side(tape.at("sub", new), place), zero))
+        elif moves[place] and name in ("abs", "sign"):
+            held = side(new[0], place)
+            moved[place] = tape.at("mul", (held, new[0])) if name == "abs" else held
+        else:
+            moved[place] = place if new == operands else tape.at(name, new, data)
+    return Outcomes(tuple(moved[place] for place in results), tuple(numbers), tuple(origins))

@@ -1,0 +1,205 @@
+"""Corners of branches: closed forms, and random piecewise-linear systems whose branches are enumerated region by region."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import contin
+from contin import AlgebraicProblem, solve, trace
+
+
+def corners(branch):
+    return [(round(point[branch.points[0].system.free[0]], 9) + 0.0, point.details.kind) for point in branch.labelled("BC")]
+
+
+def followed(residual, states, at, guess, low, high, **more):
+    problem = AlgebraicProblem(residual, states, {"a": at}, dynamics=False)
+    return trace(solve(problem, guess), free=["a"], limits={"a": (low, high)}, **more)
+
+
+# --- closed forms ------------------------------------------------------------------------------------------------------
+
+
+def test_a_branch_turns_or_goes_on_at_a_corner():
+    """|x| = a turns at 0; x + max(0, x - 1) = a goes on at 1, with half the slope."""
+    branch = followed(lambda u, p: (abs(u.x) - p.a,), ["x"], 1.0, [1.0], -1, 2, direction=-1)
+    assert corners(branch) == [(0, "fold")] and branch.points[-1].x == pytest.approx([-2, 2])
+    (corner,) = branch.labelled("BC")
+    assert corner.name.startswith("abs(u.x), line ") and abs(corner.x[0]) < corner.errors["a"] < 1e-13
+    branch = followed(lambda u, p: (u.x + max(0, u.x - 1) - p.a,), ["x"], 0.5, [0.5], -1, 4)
+    assert corners(branch) == [(1, "goes on")] and branch.points[-1].x == pytest.approx([2.5, 4])
+    assert branch.labelled("BC")[0].details.ways[0] == pytest.approx(np.array([1, 2]) / np.sqrt(5))
+
+
+def test_a_branch_ends_where_the_equations_jump_or_have_no_slope():
+    branch = followed(lambda u, p: (u.x + (1.0 if u.x > 1 else 0.0) - p.a,), ["x"], 0.5, [0.5], -1, 4)
+    assert corners(branch) == [(1, "end, the equations jump")] and "the equations jump" in str(branch.stop)
+    branch = followed(lambda u, p: (u.x - p.a + max(u.x, 0) ** 0.5,), ["x"], -1.0, [-1.0], -1, 1)
+    assert corners(branch) == [(0, "end, derivatives are not finite")]
+
+
+def test_smooth_conditions_and_conditions_that_stay_zero_are_passed_in_silence():
+    """A guarded quotient, max(0, x)^2, and v |v| at rest, where the Hopf point is found."""
+
+    def sinc(x):
+        return np.sin(x) / x if abs(x) > 1e-3 else 1 - x**2 / 6 + x**4 / 120
+
+    for residual in (lambda u, p: (sinc(u.x) * u.x - p.a,), lambda u, p: (u.x + max(0, u.x) ** 2 - p.a,)):
+        branch = followed(residual, ["x"], -0.5, [-0.5], -0.6, 0.6)
+        assert not branch.labelled("BC") and branch.points[-1]["a"] == 0.6 and not branch.notes
+    spring = AlgebraicProblem(lambda u, p: (u.v, p.m * u.v - abs(u.v) * u.v - u.x), ["x", "v"], {"m": -1.0})
+    branch = trace(solve(spring, [0.0, 0.0]), free=["m"], limits={"m": (-1, 1)})
+    assert [point.label for point in branch if point.label] == ["EP", "HB", "EP"]
+
+
+def test_where_sides_change_their_branches_several_ways_leave():
+    """a x = |x| x: x = 0, and |x| = a for a > 0; from x = a three ways lead on, and each can be taken."""
+    branch = followed(lambda u, p: (p.a * u.x - abs(u.x) * u.x,), ["x"], 0.8, [0.8], -1, 1, direction=-1)
+    (corner,) = branch.labelled("BC")
+    assert corner.details.kind == "several" and len(corner.details.ways) == 3
+    ends = [trace(corner, branch=number, limits={"a": (-1, 1)}).points[-1].x.round(12) + 0.0 for number in range(3)]
+    assert sorted(map(tuple, ends)) == [(-1, 1), (0, -1), (0, 1)]
+
+
+def test_stability_may_change_by_a_jump(tmp_path):
+    """The damping has the sign of x: a pair of eigenvalues goes to the other side with no Hopf point. It is kept in a file."""
+    field = AlgebraicProblem(lambda u, p: (u.v, p.a - u.x - np.where(u.x > 0, -1.0, 1.0) * u.v), ["x", "v"], {"a": -1.0})
+    branch = trace(solve(field, [-1.0, 0.0]), free=["a"], limits={"a": (-1, 1)})
+    assert corners(branch) == [(0, "goes on")] and branch.labelled("BC")[0].details.unstable == (0, 2)
+    contin.save(branch, tmp_path / "branch.npz")
+    kept = contin.load(field, tmp_path / "branch.npz").labelled("BC")[0]
+    assert kept.details.kind == "goes on" and kept.details.unstable == (0, 2) and len(kept.details.ways) == 1
+
+
+def test_a_diamond_closes():
+    branch = followed(lambda u, p: (abs(u.x) + abs(p.a) - 1,), ["x"], 0.5, [0.5], -2, 2)
+    assert corners(branch) == [(1, "fold"), (0, "goes on"), (-1, "fold"), (0, "goes on")]
+    assert branch.stop.reason == "closed"
+
+
+@pytest.mark.parametrize("depth", [1e-1, 1e-3, 1e-5, -1e-3])
+def test_numbers_that_pass_zero_twice_in_a_step(depth):
+    """x = a^2 - depth: y = |x| has two corners at a = +- sqrt(depth), and none where x stays positive."""
+    branch = followed(lambda u, p: (u.x - p.a**2 + depth, u.y - abs(u.x)), ["x", "y"], -1.0, [1.0, 1.0], -1, 1)
+    root = round(max(depth, 0) ** 0.5, 9)
+    assert corners(branch) == ([(-root, "goes on"), (root, "goes on")] if depth > 0 else [])
+
+
+# --- random piecewise-linear systems -----------------------------------------------------------------------------------
+
+#: The parameter is followed between these ends.
+LIMIT = 3.0
+
+
+class Linear:
+    """A z + B |C z + c| + r = 0, and with ``nested`` also the absolute values of others that contain these; z = (x, a)."""
+
+    def __init__(self, seed, meet=0):
+        random = np.random.default_rng(seed)
+        self.n, first, second = int(random.integers(2, 5)), int(random.integers(max(2, meet), 4)), int(random.integers(0, 3))
+        size, self.count = self.n + 1, first + second
+        self.A, self.B = random.normal(size=(self.n, size)), 0.7 * random.normal(size=(self.n, self.count))
+        self.C, self.c = random.normal(size=(self.count, size)), random.normal(size=self.count)
+        self.D = np.zeros((self.count, self.count))  # what the second numbers contain of the first absolute values
+        self.D[first:, :first] = random.normal(size=(second, first))
+        z = 0.5 * random.normal(size=size)
+        self.c[:meet] = -self.C[:meet] @ z  # so many conditions meet there
+        self.r = -(self.A @ z + self.B @ self.sizes(z.tolist()))
+        self.z, self.first = z, first
+
+    def sizes(self, z):
+        found = []
+        for row, offset, of in zip(self.C, self.c, self.D):
+            inside = sum(float(c) * each for c, each in zip(row, z)) + float(offset)
+            found.append(abs(inside + sum(float(d) * each for d, each in zip(of, found))))
+        return found
+
+    def residual(self, u, p):
+        z = [*u, p.a]
+        sizes = self.sizes(z)
+        return tuple(
+            sum(float(a) * each for a, each in zip(self.A[i], z))
+            + sum(float(b) * s for b, s in zip(self.B[i], sizes))
+            + self.r[i]
+            for i in range(self.n)
+        )
+
+    def pieces(self):
+        """Return the segments of the branch, region by region: both ends."""
+        for signs in itertools.product((1.0, -1.0), repeat=self.count):
+            inverse = np.linalg.inv(np.eye(self.count) - self.D * np.array(signs))  # numbers g = C z + c + D s g
+            C, c = inverse @ self.C, inverse @ self.c
+            signed = self.B * np.array(signs)
+            J, r = self.A + signed @ C, self.r + signed @ c
+            start, way = np.linalg.lstsq(J, -r, rcond=None)[0], np.linalg.svd(J)[2][-1]
+            rates, values = np.array(signs) * (C @ way), np.array(signs) * (C @ start + c)
+            ends = sorted((end - start[-1]) / way[-1] for end in (-LIMIT, LIMIT))
+            low = max(ends[0], *(-v / a for a, v in zip(rates, values) if a > 0), -np.inf)
+            high = min(ends[1], *(-v / a for a, v in zip(rates, values) if a < 0), np.inf)
+            if high - low > 1e-11:
+                yield start + low * way, start + high * way
+
+
+def expected(pieces, z, sense):
+    """Return the corners that a walk along the segments meets from z on, which lies on one of them, and how many ways leave."""
+    at, before = z, next(i for i, ends in enumerate(pieces) if distance(ends, z) < 1e-9)
+    end = max(pieces[before], key=lambda each: sense * each[-1])
+    found, ways = [], []
+    while True:
+        came, at = end - at, end
+        if abs(abs(at[-1]) - LIMIT) < 1e-9 or (found and np.abs(at - found[0]).max() < 1e-9):
+            return found, ways
+        following = [
+            (i, ends[1 - e] - at)
+            for i, ends in enumerate(pieces)
+            if i != before
+            for e in (0, 1)
+            if np.abs(ends[e] - at).max() < 1e-9
+        ]
+        found.append(at)
+        ways.append(len(following))
+        before, ahead = max(following, key=lambda each: each[1] @ came / np.linalg.norm(each[1]))
+        end = at + ahead
+
+
+def distance(ends, z):
+    along = ends[1] - ends[0]
+    part = np.clip((z - ends[0]) @ along / (along @ along), 0, 1)
+    return np.abs(ends[0] + part * along - z).max()
+
+
+def agree(system):
+    """Compare runs both ways from the middle of a segment near z with the walk along segments."""
+    pieces = list(system.pieces())
+    if not pieces:
+        pytest.skip("the solution is isolated")
+    start, end = min(pieces, key=lambda ends: distance(ends, system.z))
+    z = start + 0.37 * (end - start)
+    problem = AlgebraicProblem(system.residual, [f"x{i}" for i in range(system.n)], {"a": float(z[-1])}, dynamics=False)
+    first = solve(problem, z[:-1])
+    assert first.x == pytest.approx(z[:-1], abs=1e-9)
+    for sense in (1, -1):
+        branch = trace(first, free=["a"], direction=sense, limits={"a": (-LIMIT, LIMIT)})
+        places, ways = expected(pieces, z, sense)
+        met = branch.labelled("BC")[: len(places)]
+        assert [len(point.details.ways) for point in met] == ways
+        names = [*problem.states, "a"]
+        assert all([point[name] for name in names] == pytest.approx(place, abs=1e-9) for point, place in zip(met, places))
+        assert branch.stop.reason in ("limit", "closed", "known branch") and {point.label for point in branch} <= {
+            "",
+            "EP",
+            "BC",
+        }
+
+
+@pytest.mark.sample(20)
+@pytest.mark.parametrize("seed", range(200))
+def test_random_systems(seed):
+    agree(Linear(seed))
+
+
+@pytest.mark.sample(10)
+@pytest.mark.parametrize("seed", range(100))
+def test_random_systems_in_which_conditions_meet(seed):
+    agree(Linear(1000 + seed, meet=2 + seed % 2))
