@@ -259,8 +259,8 @@ class Continuation:
         if ways:
             at, accepted = corner or point, state.accepted + 1
             behind = on_branch(ways[0].system, at.trial.x, ways[0].tangent, settings, False)
-            numbers = {"arclength": state.arclength + at.at, "step": min(state.step, settings.step), "accepted": accepted}
-            self.go_on((dataclasses.replace(behind, **numbers), None))
+            length, step = state.arclength + at.at, min(state.step, settings.step)
+            self.go_on((dataclasses.replace(behind, arclength=length, step=step, accepted=accepted), None))
             left = np.concatenate([at.trial.x, ways[0].tangent])
             if any(np.abs(left - known).max() < APART for known in self._left if known.size == left.size):
                 self.stop = Stop(Reason.KNOWN_BRANCH, "the run comes back to a corner, and the way on is known")
