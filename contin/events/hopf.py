@@ -150,8 +150,15 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
         return np.empty(0, complex), np.empty(0, complex)  # as where all is stable
     first, last = _matched(left, right)
     changed = (first.real > 0) != (last.real > 0)
+    if hasattr(system, "autonomous"):  # logarithms of multipliers: a negative one is real, and alone
+        changed &= ~(_is_negative(first) & _is_negative(last))
     upper = (first.imag > -DOUBLED * (1 + np.abs(first))) | (last.imag > -DOUBLED * (1 + np.abs(last)))
     return first[changed & upper], last[changed & upper]
+
+
+def _is_negative(logarithms: ComplexArray) -> Any:
+    """Return which logarithms belong to negative multipliers."""
+    return np.abs(np.abs(logarithms.imag) - math.pi) < DOUBLED
 
 
 def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
