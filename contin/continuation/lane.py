@@ -260,7 +260,7 @@ class MeshLane(Lane):
         k, segments = len(system.free), self._work.mesh.whole.last
         self._relations = [Relations.unfilled(system.intervals, n, k, segments) for _ in range(2)]
         self._quotient, self._watched = _quotient((segments + 1) * n + k), settings.branch_points
-        self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
+        self.spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
         self._left: tuple[Array, _Begun] | None = None
 
     def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:
@@ -297,7 +297,7 @@ class MeshLane(Lane):
                 found, clear = MAY_BRANCH, self._compared(after.room, 0)
                 if self._monodromy is not None:
                     earlier, time = time, self.system.unit_time(path.x[number])
-                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, time / earlier)
+                    found = multipliers_ask(self._monodromy, self.spectra, values.jacobian, time / earlier)
                 asks = found == ASK or not (found == AWAY or self._stays_regular(clear, before, after))
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
@@ -308,6 +308,8 @@ class MeshLane(Lane):
                 here = self._trial(path, number, after)
                 asks = self._asks(begin, here, path.numbers[number])
             if asks:
+                if step <= 0:
+                    self.spectra.moved[0] = np.inf
                 if step:
                     self._hand_over(path, number, abs(step), (before, after))
                 return number - 2, indices or None
@@ -337,7 +339,7 @@ class MeshLane(Lane):
                 return None
             factors = self._factors[0]
         self._compared(factors.room, 1)
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0.0) == ASK:
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self.spectra, values.jacobian, 0.0) == ASK:
             return None
         return factors, 0
 
@@ -385,8 +387,11 @@ class Lanes:
         """Return the lane of a system with these settings; None where there is none."""
         if self._for != (system, settings, noisy):
             self._for = system, settings, noisy
-            if self._known is None or not self._known.serves(system, settings, noisy):
+            known = self._known
+            if known is None or not known.serves(system, settings, noisy):
                 self._known = lane_of(system, settings, *self._run, noisy)
+                if isinstance(known, MeshLane) and isinstance(self._known, MeshLane):
+                    self._known.spectra.moved[:] = known.spectra.moved
         return self._known
 
 

@@ -140,7 +140,9 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: 
     ``longer`` at its end by this factor; where that is 0, the step begins here and nothing is compared. Round-off on the circle
     asks, too.
     """
-    n, size = room.real.size, spectra.real.shape[1]
+    n, size, before = room.real.size, spectra.real.shape[1], spectra.moved[0]
+    if longer > 0.0:
+        spectra.moved[0] = math.inf
     for a in range(size):
         spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
     for q in range(jacobian.shape[0]):
@@ -162,6 +164,6 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: 
         at += 1
     if longer == 0.0:
         return AWAY
-    if may_cross_between(spectra, longer):
+    if may_cross_between(spectra, longer, before):
         return ASK
     return AWAY if keep_off_one(spectra, longer) else MAY_BRANCH

@@ -27,6 +27,13 @@ FIRST, LAST, _COUNT = 0, len(LOOKS) + 1, len(LOOKS) + 2
 #: Those among them at which pairs of multipliers are followed: a quarter of the step apart.
 _QUARTERS = tuple(place for place, part in enumerate([0.0, *LOOKS, 1.0]) if (4 * part) % 1 == 0)
 
+#: Least distance of multipliers from the circle, as logarithms, for a step that is not looked at inside since they stand still.
+#: Ten times smaller, doublings may be passed between which that distance is passed and regained; ten times larger, none stand.
+_OFF = 0.3
+#: They stand still where they move by less than the distance over this, in the step and in the one before: what passes -1, or
+#: the circle, inside a step and comes back moves as far as that beside it. Ten times smaller is too near to that.
+_STILL = 30.0
+
 
 class Moves(NamedTuple):
     """Between which of some places a pair may move to the imaginary axis.
@@ -53,6 +60,7 @@ class Spectra(NamedTuple):
 
     ``values`` are those of the test function of period doublings, ``cubic`` (4, size) the coefficients of the cubic between
     both ends, ``place`` a point of it, ``parts`` the places as parts of the step, ``ends`` and ``quarters`` room for moves.
+    ``moved`` (1,) is how far they moved in the step before, as parts of their distances from the circle.
     """
 
     square: Stack
@@ -64,6 +72,7 @@ class Spectra(NamedTuple):
     cubic: Matrix
     place: Vector
     parts: Vector
+    moved: Vector
     ends: Moves
     quarters: Moves
 
@@ -72,7 +81,8 @@ def spectra_of(n: int, size: int) -> Spectra:
     """Return the room for n eigenvalues of a problem with so many unknowns."""
     return Spectra(
         np.empty((1, n, n)), np.empty((1, n)), np.empty((1, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)),
-        np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES, moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
+        np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES, np.full(1, np.inf),
+        moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
     )  # fmt: skip
 
 
@@ -180,12 +190,29 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 
 
 @helper
-def may_cross_between(spectra: Spectra, longer: float) -> bool:
-    """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step alone."""
+def may_cross_between(spectra: Spectra, longer: float, before: float) -> bool:
+    """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step and moves ``before`` it."""
+    spectra.moved[0] = _moved(spectra)
     if _crosses(spectra):
         return True
+    if _STILL * max(spectra.moved[0], before) < 1:
+        return False
     real, imaginary = spectra.real, spectra.imaginary
     return bool(comes_near(real, imaginary, MINUS_ONE, 0, longer) or comes_near(real, imaginary, CIRCLE, 0, longer))
+
+
+@helper
+def _moved(spectra: Spectra) -> float:
+    """Return how far a multiplier moves in a step, as a part of its distance from the circle; infinity if one is near it."""
+    n, largest = spectra.real.shape[1], 0.0
+    for each in range(2 * n):
+        here, there, i = (FIRST, LAST, each) if each < n else (LAST, FIRST, each - n)
+        x, y, move = spectra.real[here, i], spectra.imaginary[here, i], math.inf
+        for j in range(n):
+            turn = abs(y - spectra.imaginary[there, j])
+            move = min(move, math.hypot(x - spectra.real[there, j], min(turn, 2 * math.pi - turn)))
+        largest = max(largest, move / abs(x) if abs(x) > _OFF else math.inf)
+    return largest
 
 
 @helper

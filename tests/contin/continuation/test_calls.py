@@ -46,6 +46,18 @@ def cycles():
     return trace(hopf, branch=1, limits={"r": (15, 25)}, max_points=10).points[-1], "r", 0.05
 
 
+def stable_states():
+    """A circle of radius 1 that drives three states with multipliers exp(-1.9) to exp(-2.5): near enough to 1 to be watched."""
+
+    def field(u, p):
+        size = p.mu - u.x**2 - u.y**2
+        return u.x * size - u.y, u.y * size + u.x, u.x - 0.3 * u.a, u.a - 0.35 * u.b, u.b - 0.4 * u.c
+
+    problem = contin.CycleProblem(field, ["x", "y", "a", "b", "c"], {"mu": 1.0})
+    guess = solve(problem, lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), 0, 0, 0), {"period": 6.0})
+    return guess, "mu", 0.002
+
+
 def calls(point, name, step, count):
     """How many Python functions a run of so many points calls."""
     found = 0
@@ -64,7 +76,7 @@ def calls(point, name, step, count):
     return found
 
 
-KINDS = {kind.__name__: kind for kind in (equilibria, henon, bratu, cycles)}
+KINDS = {kind.__name__: kind for kind in (equilibria, henon, bratu, cycles, stable_states)}
 
 
 @pytest.mark.sample(2)
