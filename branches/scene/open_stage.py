@@ -201,6 +201,8 @@ class OpenStage(Stage):
                 f"follow: {followed!r}: the state at the start of the stage was not found again with this number free; follow "
                 "another one first, or refine the mesh (mesh.intervals, mesh.tolerance)"
             ) from error
+        except ProblemError as error:
+            raise ConfigError(str(error)) from error
         start = point_of(run.state.system, run.state.x)
         for name, (low, high) in run.settings.limits.items():
             slack = levels.LOCATED * max(abs(low), abs(high), high - low)

@@ -269,8 +269,10 @@ class _Part(NamedTuple):
     size: int
 
 
-def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
+def second_variation(system: Collocation, x: Array, phases: bool = True) -> SecondVariation | None:
     """Return the second variation at a solution x of a variational problem; None where Legendre's condition fails.
+
+    Without ``phases`` these conditions are not held.
 
     Raises
     ------
@@ -283,7 +285,7 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
         if local is None:
             return None
         parts.append(_part(system, own, *local))
-    values, vectors = _reduced(system, x, parts)
+    values, vectors = _reduced(system, x, parts, phases)
     return SecondVariation(values, vectors, tuple(parts))
 
 
@@ -433,7 +435,7 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
     return turned, _Recovery(turn, rest, len(turn))
 
 
-def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Array, Array]:
+def _reduced(system: Collocation, x: Array, parts: Sequence[_Part], phases: bool) -> tuple[Array, Array]:
     """Return eigenvalues and eigenvectors of Q over (x of the first end, all y) of each part, with the conditions held."""
     ends, second = _ends(system, x)
     n, size = system.problem.dimension, sum(part.size for part in parts)
@@ -449,6 +451,11 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part]) -> tuple[Arr
         both[states, own], both[n + states, own] = profile.starts[0], profile.starts[-1]
         begin += count
     q += both.T @ second @ both
+    if not phases:
+        names = system.problem.phases
+        held = held[[f"mu_{name}" not in names for name in system.problem.variation.integrals]]
+        others = [i for i in range(2 * n) if i < n or f"lam_{system.problem.state_names[i - n]}" not in names]
+        ends = ends[np.abs(ends[:, others]).max(axis=1, initial=0.0) > 0]
     rows = np.vstack([ends @ both, held])
     sizes = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = np.where(sizes > ROUND_OFF, rows, 0.0) / np.maximum(sizes, ROUND_OFF)  # without a slope: round-off is none

@@ -15,10 +15,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+
 from contin import errors as checks
 from contin.arrays import Array, Function
 from contin.boundary.canonical import Canonical, EndConditions, Variation, canonical
-from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, stability_of
+from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, second_variation, stability_of
 from contin.boundary.statement import (
     BoundaryValueProblem,
     Piece,
@@ -30,12 +32,13 @@ from contin.boundary.statement import (
     sums,
 )  # fmt: skip
 from contin.boundary.system import Collocation
-from contin.core.trial import Event
+from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
+from contin.levels import LOCATED
 from contin.problems.rewriting import of_parameters
 from contin.problems.statement import check_statement, portable
 from contin.text import shown
@@ -77,8 +80,8 @@ class VariationalProblem(BoundaryValueProblem):
         returns the image of x, as for `contin.diagram`. Special points say which of them they break.
     phases : sequence of str, optional
         Names of those ``integrals`` that hold by a continuous symmetry and pick one of the solutions that it moves into each
-        other; with ``hamiltonian``, of states that accumulate such an integral. Their multipliers are zero then. A run notes
-        labelled points at which they are not: the condition loads the structure.
+        other; with ``hamiltonian``, of states that accumulate such an integral. Their multipliers are zero then. A run that
+        begins where they are not is refused (`ProblemError`), and labelled points at which they are not are noted.
     domain : pair of float
     starts : mapping of str to float, optional
         Where the search for the controls starts at each point (0): in the domain of the energy.
@@ -218,6 +221,12 @@ class VariationalProblem(BoundaryValueProblem):
     def undetermined(self, system: Collocation, x: Array) -> str:
         """Return that conditions repeat or contradict each other at a solution x."""
         return degeneracy(system, x, solved=True) if self.has_index else ""
+
+    def index_without_phases(self, trial: Trial) -> int | None:
+        """Return the index of a solution where phases are not held, without the modes that symmetries make; None of none."""
+        system: Any = trial.system
+        found = second_variation(system, trial.x, phases=False) if self.phases and self.has_index else None
+        return None if found is None else int(np.count_nonzero(found.eigenvalues < -LOCATED * np.abs(found.eigenvalues).max()))
 
     @property
     def has_index(self) -> bool:

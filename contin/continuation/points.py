@@ -13,6 +13,7 @@ from contin.collocation.corners import Switching
 from contin.core.labels import BY_VALUES, CONFIRMED, Label
 from contin.core.settings import Settings
 from contin.core.trial import Event, Trial
+from contin.errors import ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
 from contin.events.phase_loads import phase_loads
@@ -84,7 +85,17 @@ class Notes:
             what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
             does = "makes this branch point, which gets no label" if is_made else "loads the structure; leave it out"
             self.add(f"phases: {name} {what} and not zero, so the phase condition {does}")
+        free = getattr(trial.system.problem, "index_without_phases", lambda _: None)(trial)
+        if found.label == Label.END and free is not None and free != (index := trial.system.stability(found).index):
+            self.add(f"phases: the index {index} at EP ({self.place(trial)}) leaves out what they hold: {free} without them")
         return is_made
+
+    def check_phases(self, trial: Trial) -> None:
+        """Raise ProblemError for a phase condition that loads the solution at which a branch starts, or its tangent there."""
+        for name, load, is_mode in phase_loads(trial.system, trial.x, [trial.tangent], trial.newton_error + self.tolerance):
+            here = f"at the start ({self.place(trial)})"
+            what = f"grows along the branch {here}" if is_mode else f"= {load:.6g} {here} and not zero"
+            raise ProblemError(f"phases: {name} {what}: no symmetry of the problem implies this phase; leave it out")
 
     def noise(self, arc: Arc, allowed: float) -> None:
         """Note once that a point is known worse than ``allowed``."""

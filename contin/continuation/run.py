@@ -100,6 +100,8 @@ class Continuation:
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
         self._judge = Judge(self.start, settings, self._tests, general, self._steps.fold, self._steps.sense)
+        if state is None:
+            self._notes.check_phases(self.here())
         self._handed: Handed | None = None  # the next step, where a kernel has made it
         self._left: list[Array] = []  # corners, each with the tangent of the way on
         self._adapted = -1  # regular points at which the mesh was looked at last

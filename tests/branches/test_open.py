@@ -370,15 +370,23 @@ def test_the_snap_of_the_clamped_strip(root, tmp_path):
 
 
 def test_notes_of_stages(tmp_path, capsys):
-    """What a stage notes is printed and kept: here a phase that no symmetry implies, which loads the strip."""
-    scene = "material: {law: rod, B1: 1, B2: 1, C: 0.8, kappa_n: 6.283185307179586}\nphases: [spin]\n"
-    config = parse(scene + "stages: [{follow: turn, to: 0.5}, {follow: turn, to: 1}]\n", "scene")
-    assert run_scene(config, tmp_path / "cut.h5", Display(quiet=True)) == "complete"
-    notes = read_branch(tmp_path / "cut.h5").notes
+    """What a stage notes is printed and kept: here that a phase holds a mode which no symmetry makes."""
+    scene = "material: {law: rod, B1: 1, B2: 1, C: 0.8}\nfinish: free\nnumbers: {force_tangent: -9}\nphases: [spin]\n"
+    config = parse(scene + "stages: [{follow: force_tangent, to: -10}, {follow: force_tangent, to: -12}]\n", "scene")
+    assert run_scene(config, tmp_path / "column.h5", Display(quiet=True)) == "complete"
+    notes = read_branch(tmp_path / "column.h5").notes
     shown = capsys.readouterr().out
-    assert [note[:31] for note in notes] == [f"stage {i}: phases: lam_phase_spin" for i in (1, 2, 2)]
-    assert len(set(notes)) == 3 and all(note in shown for note in notes)
-    assert "= -33.3853" in notes[-1]
+    assert [note[:16] for note in notes] == [f"stage {i}: phases:" for i in (1, 1, 2, 2)]
+    assert len(set(notes)) == 4 and all(note in shown for note in notes)
+    assert "the index 1 at EP" in notes[0] and "makes this branch point, which gets no label" in notes[3]
+
+
+def test_a_phase_that_no_symmetry_implies_is_not_taken(tmp_path):
+    """A circle that is cut, turned at one end, and joined."""
+    scene = "material: {law: rod, B1: 1, B2: 1, C: 0.8, kappa_n: 6.283185307179586}\nphases: ['shift, right']\n"
+    config = parse(f"{scene}stages: [{{follow: turn, to: 1}}]\n", "scene")
+    with pytest.raises(ConfigError, match="phases: lam_phase_shift_right grows along the branch at the start"):
+        run_scene(config, tmp_path / "cut.h5", Display(silent=True))
 
 
 # --- sizes of states and numbers ------------------------------------------------------------------------------------------

@@ -55,19 +55,15 @@ def shot(turn: float) -> float:
 @pytest.mark.full
 @pytest.mark.parametrize("phase", ["", "spin", "shift, right", "shift, left", "shift, two waves"])
 def test_a_cut_ring_with_an_end_turned(phase):
-    """No symmetry moves it: every phase is a load, which is said, with its multiplier. Without one the energy is right."""
+    """No symmetry moves it: every phase would be a load along the branch, and is refused. Without one the energy is right."""
     strip = OpenStrip(CUT, phases=(phase,) if phase else ())
-    branch = contin.trace(strip.first_point(), free=["turn"], limits={"turn": (0, 1)})
-    point, right = branch[-1], shot(1.0)
-    if not phase:
-        assert abs(point["energy"] - right) < 1e-10 and not branch.notes
+    if phase:
+        name = "lam_phase_" + phase.replace(", ", "_").replace(" ", "_")
+        with pytest.raises(ProblemError, match=f"phases: {name} grows along the branch at the start"):
+            contin.trace(strip.first_point(), free=["turn"], limits={"turn": (0, 1)})
         return
-    ((name, load),) = point.phase_loads().items()
-    assert point["energy"] > right + 0.1 and abs(load) > 10
-    assert branch.notes == [
-        f"phases: {name} = {load:.6g} at EP (turn = 1) and not zero, so the phase condition loads the structure; leave it out"
-    ]
-    assert name == "lam_phase_" + phase.replace(", ", "_").replace(" ", "_")
+    branch = contin.trace(strip.first_point(), free=["turn"], limits={"turn": (0, 1)})
+    assert abs(branch[-1]["energy"] - shot(1.0)) < 1e-10 and not branch.notes
 
 
 def greenhill(order: int) -> float:
@@ -88,7 +84,8 @@ def test_branch_points_that_a_phase_makes(load):
     right = [math.pi**2 * (order - 0.5) ** 2 if sign < 0 else greenhill(order) for order in (1, 2)]
     np.testing.assert_allclose([sign * point[load] for point in branch.labelled("BP")], right, rtol=1e-9)
     made = [note for note in branch.notes if "makes this branch point, which gets no label" in note]
-    assert made == branch.notes and f"{load} = {'-10.986' if sign < 0 else '49.900'}" in made[0]
+    assert all(note.startswith("phases: the index") for note in branch.notes if note not in made)
+    assert f"{load} = {'-10.986' if sign < 0 else '49.900'}" in made[0]
 
 
 @pytest.mark.parametrize(("numbers", "phases", "has"), [
