@@ -51,7 +51,7 @@ def on_branch(states, mode):
     )
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kappa_n", PLACES)
 def test_a_state_is_solved_to_its_error(folder, kappa_n):
     """Interpolated, kappa* was off by 7e-5 and the energy by 4e-4 at kappa_n = 3, with eight digits after the point."""
@@ -66,7 +66,7 @@ def test_a_state_is_solved_to_its_error(folder, kappa_n):
                 assert abs(state.values[name] - value) <= state.errors[name] + 3e-11 * (1 + abs(value))  # the quadrature's own
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kappa_n", PLACES)
 def test_without_the_files_the_digits_hold_and_the_word_is_there(folder, kappa_n):
     states = states_at(read(folder), kappa_n)

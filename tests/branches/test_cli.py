@@ -137,6 +137,7 @@ def test_it_is_installed_as_ribbon(root):
     assert project["scripts"] == {"ribbon": "branches.cli:main"}
 
 
+@pytest.mark.full
 def test_a_variable_of_the_environment_that_contin_does_not_know_is_one_line(command):
     (command.folder / "scene.yaml").write_text("{m: 1, n: 2}")
     done = command("run", "scene.yaml", program=PROGRAM, env={"CONTIN_PROCESSOR": "x86-64-v4"})

@@ -373,6 +373,7 @@ def test_a_scheduler_that_is_not_there():
     gc.collect()  # Dask's client closes itself when it is freed, and waits for ever where that is while another one starts
 
 
+@pytest.mark.full
 def test_a_scheduler_without_workers_is_refused(tmp_path, call, monkeypatch):
     """At the start; and, after all workers have left, while jobs are waited for."""
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")

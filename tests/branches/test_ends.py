@@ -30,6 +30,7 @@ def test_an_end_that_the_linear_theory_does_not_know_is_named_possible():
     assert run.stop.reason == "no convergence" and "no bifurcation of the 3-covered circle" in run.stop.message
 
 
+@pytest.mark.full
 def test_the_law_of_finite_width_says_where_it_ends():
     """(3, 1), Gamma = 30.7, nu = .35: the quadrature is lost at kappa_n = -17.193 (`ribbon_model.exact_finite_width`)."""
     points, run = points_of(ClosedScene(law="finite width", m=3, n=1, nu=0.35, Gamma=30.7))

@@ -109,6 +109,7 @@ def test_what_is_accepted_runs(tmp_path_factory, silent, data):
         assert "\n" not in str(error) and not os.listdir(path.parent)
 
 
+@pytest.mark.full
 def test_the_least_number_as_smallest_step(tmp_path, silent):
     """Where a run fails, no smaller step can be advised."""
     mesh = "{degree: 2, intervals: 5, max_intervals: 40, tolerance: 1.0e-14, adapt_every: 3}"

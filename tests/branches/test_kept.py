@@ -49,7 +49,7 @@ def test_a_file_of_the_version_before_is_read(name, tmp_path):
     assert set(branch.events.dtype.names) <= set(branch.columns.table("events"))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith("unfinished")])
 def test_an_unfinished_file_of_the_version_before_goes_on(name, tmp_path):
     """It keeps its columns, and its new rows are those of a run without an interruption."""

@@ -243,6 +243,7 @@ stages:
     assert -last["beam_at_0_5_y"] == pytest.approx(1 / 192, rel=2e-3)  # P L^3 / 192 B for small loads
 
 
+@pytest.mark.full
 def test_pieces_of_a_cut_strip_have_names_that_no_strip_has(run):
     """A cut strip s beside one with the name s_1: each bears its own load; loads in two spellings of one place add up."""
     text = f"""
@@ -603,6 +604,7 @@ def test_joints_are_fixed_on_strips(run):
     assert abs(axis @ [1, 0, 0]) == pytest.approx(1, abs=1e-9)  # the plane of the drawing is that of the state
 
 
+@pytest.mark.full
 def test_a_force_that_follows_is_an_arrow_that_turns(run, tmp_path):
     """It keeps its angle to the strip; the page, too, turns it with the end, and says nothing of an index."""
     branch = run(CANTILEVER.replace("{tip: [0, 0, -1]}", "{tip: {force: [0, -1, 0], follows: true}}"))
@@ -731,6 +733,7 @@ def test_a_strut_that_floats_begins_where_its_forces_grow(end):
         strut.first_point()
 
 
+@pytest.mark.full
 def test_a_gap_that_was_closed_is_said(tmp_path, capsys):
     run_scene(parse(_portal(up=0.02), "scene.yaml"), tmp_path / "result.h5", Display())
     assert "stage 1: the drawing has a gap of 0.02 at C, which was closed" in capsys.readouterr().out

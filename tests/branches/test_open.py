@@ -188,6 +188,7 @@ def test_what_other_commands_say(tip, root, call, main, words, sentence):
     assert done.returncode == 2 and sentence in done.err and done.err.count("\n") == 1
 
 
+@pytest.mark.full
 def test_interrupted_and_run_again(tip, root, tmp_path, tables):
     """Ctrl-C keeps the points so far; --resume goes on from there, in any stage, to the same bits."""
     config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
@@ -392,7 +393,7 @@ def test_a_phase_that_no_symmetry_implies_is_not_taken(tmp_path):
 # --- sizes of states and numbers ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("B2", [1.0001, 1.001, 1.01])
 def test_a_strip_whose_components_are_small_at_first(B2, tmp_path):
     """A rod that is nearly isotropic: half a twist leaves the circle plane but for (B2 - 1)**2, which is no size of its place.

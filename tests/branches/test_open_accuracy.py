@@ -93,7 +93,7 @@ def test_a_curve_in_two_parameters_that_starts_outside_its_limits_is_refused():
 # --- dimensions ---------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("law", "modulus"),
     [("flat rod", 200e9 * 0.01 * 0.0005**3 / 12), ("ribbon", 200e9 * 0.01 * 0.0005**3 / 12 / (1 - 0.09)), ("", None)],
@@ -198,6 +198,7 @@ def test_what_newtons_method_left_counts_by_size():
             assert errors[name] == pytest.approx(left * (1 + forces), abs=1e-12)
 
 
+@pytest.mark.full
 def test_the_summary_shows_the_errors(tmp_path, capsys):
     scene = f"material: {{}}\ndimensions: {DIMENSIONS}\nnumbers: {{distance: 0.39}}\nbegin: arch\n"
     text = f"{scene}stages: [{{follow: distance, to: 0.3}}]\n"

@@ -146,6 +146,7 @@ def test_the_force_of_a_stroke_is_the_rate_of_the_energy(stroke):
     assert stroke.axis("F_stroke")[1] == "force along the stroke in N"
 
 
+@pytest.mark.full
 def test_a_notebook_has_the_units_of_the_scene(stroke):
     root = ElementTree.fromstring(stroke._repr_html_())
     head = [cell.text for cell in root.iterfind("table/thead/tr/th")]
@@ -338,6 +339,7 @@ def test_negative_numbers_have_minus_signs_and_fonts_can_be_edited(tmp_path):
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
+@pytest.mark.full
 def test_a_strip_with_dimensions_is_drawn_in_si_units_and_at_its_width(tmp_path, root):
     scene = load(root / "configs" / "strip_bandsaw.yaml")
     branch = branch_of(tmp_path, scene)

@@ -100,6 +100,7 @@ def test_main_job(command, root):
         assert line in done.out
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("m", "n"), [(1, 2), (1, 3), (3, 1), (3, 4), (3, 5), (5, 6)])
 def test_a_branch_of_the_diagram_against_the_exact_solution(m, n, tmp_path, root, silent):
     """Labelled points of a branch of Fig. 12a, in order, against the quadrature of ribbon_model.exact."""
@@ -340,6 +341,7 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
     assert tables(path) == undisturbed(config)
 
 
+@pytest.mark.full
 @pytest.mark.posix("a process is stopped by a signal")
 @pytest.mark.parametrize(
     "option", ["--resume", *(pytest.param(other, marks=pytest.mark.full) for other in ("--overwrite", "--quiet"))]
@@ -459,6 +461,7 @@ def test_nobody_reads_the_output_to_its_end(command, scene):
         assert file.attrs["status"] == "complete"
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full, which Linux has")
 def test_output_that_cannot_be_written(command, scene):
     with open("/dev/full", "w") as full:

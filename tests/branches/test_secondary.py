@@ -38,6 +38,7 @@ def test_the_branch_of_m3_n1_returns_to_it(returned):
     assert not np.any(returned.events["label"] == b"LP")  # the turns of the pitchforks are no folds
 
 
+@pytest.mark.full
 def test_a_branch_is_put_between_the_bifurcations_that_it_joins(returned, tmp_path):
     run_scene(
         parse("{m: 3, n: 1, stability: true, limits: {kappa_n: [-120, 100]}, stride: 50}", "scene"), tmp_path / "p.h5",

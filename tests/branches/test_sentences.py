@@ -41,6 +41,7 @@ def test_an_advice_names_a_field_of_the_scene_and_the_run_goes_on_with_it(m, n, 
     assert len(read_branch(tmp_path / "y.h5").points) > len(branch.points) + 10
 
 
+@pytest.mark.full
 def test_a_failed_stage_of_a_law_with_an_end_is_told_so(tmp_path):
     """A ribbon whose thickness falls: the least margin lies inside, and the engine speaks of abs and max."""
     scene = 'material: {law: ribbon, nu: 0.3, kappa_n: 1}\nalong: {thickness: "1 - s/2"}\nfinish: free\n'

@@ -283,6 +283,7 @@ def test_a_strip_of_solid_elements_loses_stability_where_the_law_says():
     assert outcome.root == pytest.approx(law_root(FINITE_WIDTH, {"nu": 0.3, "Gamma": 75.0}, largest=0.99), rel=0.02)
 
 
+@pytest.mark.full
 @needs_ccx
 def test_both_ways_give_the_same_vibration():
     """The natural curvature bent away, and put in by expansion: a strip of w**2/(R h) = .25."""

@@ -125,7 +125,7 @@ def test_bounding_boxes_of_an_arc_a_loop_and_a_twisted_strip():
     np.testing.assert_allclose(twisted, [math.hypot(WIDTH, THICKNESS)] * 2 + [1], rtol=1e-5)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["straight", "arc", "twisted", "helix of a ribbon"])
 def test_a_width_and_a_thickness_that_vary_along_the_strip_are_those_of_the_solid(name):
     """Volume: the integral of width times thickness; area of a developable surface: that of the width."""
@@ -209,6 +209,7 @@ def test_the_width_of_the_dimensions_is_that_of_the_export(result, tmp_path, cap
     assert "width 10: the scene's" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_the_shape_of_a_scene_knows_its_width_along_the_strip(result):
     branch = read_branch(result("tapered"))
     shape = branch.shape(0)

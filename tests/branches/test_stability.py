@@ -57,6 +57,7 @@ def test_the_same_points_without_and_no_column(branch, tmp_path):
     assert regular["kappa_n"] == pytest.approx(plain.points["kappa_n"], rel=1e-6)
 
 
+@pytest.mark.full
 def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
     """Index 0 up to the fold of (1, 2), 1 after it (Fig. 12 of the paper has it as a guess)."""
     run_scene(parse("{m: 1, n: 2, stability: true, stride: 50}", "scene"), tmp_path / "x.h5", Display(silent=True))

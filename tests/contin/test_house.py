@@ -8,6 +8,7 @@ import re
 import tokenize
 from pathlib import Path
 
+import pytest
 from importlinter.cli import lint_imports
 
 import contin
@@ -123,16 +124,19 @@ def listed(found):
     return "\n".join(["", *found])
 
 
+@pytest.mark.full
 def test_no_function_is_longer_than_a_screen():
     found = said(lambda path: long_functions(tree_of(path)))
     assert not found, listed(found)
 
 
+@pytest.mark.full
 def test_no_function_has_more_than_eight_arguments():
     found = said(lambda path: crowded_functions(tree_of(path)))
     assert not found, listed(found)
 
 
+@pytest.mark.full
 def test_every_constant_says_where_it_comes_from():
     found = said(lambda path: bare_constants(tree_of(path), source(path)))
     assert not found, listed(found)

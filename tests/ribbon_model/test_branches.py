@@ -92,7 +92,7 @@ def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch
     assert other.points[-1]["kappa_n"] == pytest.approx(-0.5, abs=1e-8)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("m", "n"), [(1, 3), (3, 4), (3, 5), (5, 6), (1, 4)])
 def test_folds_and_ends_against_the_quadrature(m, n):
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 10, 7)

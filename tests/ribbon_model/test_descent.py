@@ -154,7 +154,7 @@ def test_modes_of_circles_count_as_the_linear_theory(law):
 # --- downhill ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("metric", METRICS)
 def test_energy_falls_closed_and_in_its_class(metric):
     """Three loops to one: at every step less energy, closed, a quaternion that comes back to its negative."""
@@ -199,7 +199,7 @@ def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
     assert (str(rest), rest.stability.index) == ("3-covered circle", 0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("law", "m", "kappa_n", "expected"),
     [

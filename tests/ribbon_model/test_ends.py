@@ -17,7 +17,7 @@ def branch(law, m, n, nu, **options):
     return trace(point_of(system, x), Settings(**SETTINGS, **options), tangent=tangent)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("m", "n", "nu", "kappa_n"),
     [

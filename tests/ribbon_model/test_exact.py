@@ -91,7 +91,7 @@ def test_fold_in_thirty_digits(m, n, which):
             assert abs(vertex - mpmath.mpf("4.07566753526546525")) < 1e-17
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "m, n, nu, pick",
     [

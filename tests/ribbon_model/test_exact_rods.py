@@ -55,7 +55,7 @@ def test_branches_leave_and_end_on_circles(law, root, nu):
         assert law == "isotropic rod" and nu == 0 or np.all(slopes > 0) or np.all(slopes < 0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @each_branch
 def test_small_amplitude(law, root):
     """kappa_n tends to the threshold linearly in A: extrapolated to A = 0, error O(A^3)."""
@@ -118,7 +118,7 @@ def test_against_the_collocation(law, root, m, n):
     assert np.hypot(middle["M1"], middle["M2"]) == pytest.approx(abs(there.mu), abs=1e-7)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("law, A", [("flat rod", 1e3), ("isotropic rod", 3.0)])
 def test_precession_by_the_other_directors(law, A):
     """(3, 1): azimuths of d_2, d_3 integrated by mpmath over the angle phi or M_3, close too, modulo pi."""

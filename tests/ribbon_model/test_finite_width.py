@@ -324,7 +324,7 @@ def test_a_branch_on_which_the_energy_has_two_minima():
     assert found.points[-1]["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 9, 5, {"nu": 0.4, "Gamma": 40.0})[0], abs=1e-9)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("m", "n", "nu", "Gamma", "end"), [(8, 3, 0.0478, 10.21, -59.05), (9, 5, 0.13, 1.719, 0.893)])
 def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
     """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""

@@ -67,7 +67,7 @@ def _random(seed: int) -> Network:
     return Network(sections, members, joints, held, loads)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", [34, 167])
 def test_round_off_where_a_network_can_move_is_no_state(seed):
     """A ring of magnets along it, whose field does not turn it; two strips that turn about the line between their far ends."""

@@ -83,7 +83,7 @@ STATES = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", STATES)
 def test_the_index_is_that_of_the_continuous_network(name):
     """The number of negative eigenvalues of the segments' Hessian: another way to the index of the whole network."""

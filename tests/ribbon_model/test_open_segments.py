@@ -32,7 +32,7 @@ def held_where_it_is(strip, segments):
     return replace(chain, numbers={name: here.get(name, value) for name, value in strip.parameters.items()})
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     "ends", ["clamped", "free", *(pytest.param(name, marks=pytest.mark.full) for name in ("hinged", "ball"))]
 )

@@ -50,6 +50,7 @@ def test_a_column_buckles_at_eulers_loads(ends):
     assert_bifurcations(branch, "force_tangent", [-load for load in loads])
 
 
+@pytest.mark.full
 def test_the_elastica_beyond_buckling():
     """Pinned: the end angle a, P = (2 K(k))**2 and distance 2 E/K - 1 with k = sin(a/2) (DLMF 19; Love, sect. 262).
 
@@ -114,6 +115,7 @@ LATERAL = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("load, place, stiffness", [("force_width", "shear", 4.0), ("force_normal", "rise", 1.0)])
 @pytest.mark.parametrize("tension", [0.0, 2.0, -1.0])
 def test_the_tip_of_a_cantilever_goes_where_a_small_force_pulls(load, place, stiffness, tension):

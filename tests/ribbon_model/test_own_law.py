@@ -159,6 +159,7 @@ def test_a_primary_branch_against_its_quadrature(branch):
         assert (point["energy"], point["kappa_star"]) == pytest.approx((one.energy, one.kappa_star), abs=1e-8)
 
 
+@pytest.mark.full
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(LAW, 12, 6, NUMBERS)
     start = HALF_LOOP.circle(system, 1, 1.0)

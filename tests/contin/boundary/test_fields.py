@@ -404,6 +404,7 @@ def test_what_does_not_move_has_no_spectrum_and_cycles_of_fields_are_refused():
 # --- independent computations --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_stability_of_the_bimodal_state_of_kuramoto_and_sivashinsky():
     """u_t = -4 u_xxxx - alpha (u_xx + u u_x), odd. Branch point and eigenvalues are compared with 24 sine modes."""
     problem = contin.BoundaryValueProblem(

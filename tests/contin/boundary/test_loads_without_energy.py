@@ -89,6 +89,7 @@ def test_becks_column_has_no_other_state():
     assert branch[-1]["load"] == pytest.approx(60)
 
 
+@pytest.mark.full
 def test_the_buckled_column_is_an_equilibrium():
     """What the load does along the branch is the energy of the column."""
     start = _straight(_column(0.3)).labelled("BP")[0]

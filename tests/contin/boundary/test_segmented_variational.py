@@ -54,6 +54,7 @@ def test_a_cut_changes_nothing(cuts):
     assert [change for _, _, change in found] == [(0, 1), (1, 2), (2, 3)]
 
 
+@pytest.mark.full
 def test_a_buckled_rod_is_the_same_in_pieces():
     """Energy and places of the post-buckled clamped rod, in one piece and in three of different lengths."""
     states = []
@@ -88,7 +89,7 @@ def test_an_energy_that_is_not_quadratic():
 # --- frames ---------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     "clamped, length",
     [(True, 2.71645974768613), (False, 1.34955282371664)],  # k l cot(k l) = -6, k l tan(k l) = 6

@@ -114,7 +114,7 @@ def test_conditions_of_the_call_count():
     assert np.abs(system.residual(correct(system, x, row, 0.1, Newton(1e-11)).x)).max() < 1e-9
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("make", [front, loop])
 def test_projection_conditions_are_those_of_python(make):
     system, x = system_of(make)
@@ -128,6 +128,7 @@ def test_projection_conditions_are_those_of_python(make):
     assert np.abs(room.rows[:own] - rows).max() < 1e-12
 
 
+@pytest.mark.full
 def test_python_decides_where_other_eigenvalues_would_be_met():
     """Near a reference that is none, the space that Newton's method finds is not that of the least eigenvalues."""
     system, x = system_of(front)

@@ -125,7 +125,7 @@ def load_of(largest):
     return (2 * t) ** 2
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("degree", [3, 6])
 def test_a_fold_close_behind_the_first_contact(degree):
     known = -minimize_scalar(lambda m: -load_of(m), bounds=(0.501, 0.53), method="bounded", options={"xatol": 1e-9}).fun
@@ -232,6 +232,7 @@ def test_a_beam_on_a_foundation_that_does_not_pull():
 # --- what mesh points do not help --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_dry_friction():
     """x'' + x + .3 sign(x') = cos(w t): the largest x by Den Hartog (1930). The equations jump, and that is noted."""
     problem = CycleProblem(

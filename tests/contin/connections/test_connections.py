@@ -134,6 +134,7 @@ def sandstede(u, p):
     )
 
 
+@pytest.mark.full
 def test_a_homoclinic_orbit_in_space():
     """At a = 0 it is x = 1 / cosh(t / 2)^2, y = x'."""
     numbers = {"a": 0.0, "alpha": 0.3, "mu": 0.0, "nu": 0.01}

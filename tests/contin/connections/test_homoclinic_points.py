@@ -80,6 +80,7 @@ def test_a_complex_pair_becomes_real():
     assert branch.stop.message == "met non-central homoclinic orbit to a saddle-node"
 
 
+@pytest.mark.full
 def test_a_pair_crosses_the_axis():
     """At r = 0 the pair is imaginary."""
     branch = contin.trace(four_dimensional(), free=["r", "nu"], direction=-1, limits={"r": (-1, 1)})

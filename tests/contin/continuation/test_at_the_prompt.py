@@ -140,6 +140,7 @@ def test_an_advice_holds_for_more_than_a_step():
         assert "goes on" not in str(branch.stop)
 
 
+@pytest.mark.full
 def test_round_off_above_the_tolerance():
     """Layers of width e^-k: near k = 5.3 the corrections are round-off of 1e-8. They go on as far as that tells anything."""
 

@@ -79,7 +79,7 @@ def calls(point, name, step, count):
 KINDS = {kind.__name__: kind for kind in (equilibria, henon, bratu, cycles, stable_states)}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plain_step_calls_few_python_functions(kind):
     """In a process that finds all kernels compiled: where one was compiled, a function in Python stays before it.

@@ -70,7 +70,7 @@ def bits(value):
     return value.hex() if isinstance(value, float) else repr(value)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("case", [growing, pendulum, turning, sparse])
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_the_same_run_twice(case):
@@ -81,6 +81,7 @@ def test_the_same_run_twice(case):
         assert [bits(list(branch)), branch.notes, str(branch.stop)] == first
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_the_error_of_a_normal_form_does_not_depend_on_what_was_computed_before():
     """Differences elsewhere with a large error, as at a corner, have nothing to do with it."""

@@ -234,7 +234,7 @@ def test_every_labelled_branch_point_can_be_left():
         assert trace(point, branch=1, limits={"a": (-1, 2)}).stop.reason == "limit"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("degree", "direction"), [(2, 1), (2, -1), (3, -1), (6, 1)])
 def test_a_branch_is_left_for_the_other_one_where_the_first_step_takes_a_finer_mesh(degree, direction):
     """A cantilever: the branch from lam = ((n - 1/2) pi)^2 ends at lam = ((2 n - 1) K(sin(end angle / 2)))^2."""

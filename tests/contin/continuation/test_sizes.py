@@ -181,7 +181,7 @@ ORBITS = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "limits", "numbers"), ORBITS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_unfolding_parameters_that_are_zero(name, limits, numbers, direction):

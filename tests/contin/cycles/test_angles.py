@@ -161,6 +161,7 @@ def forced_field(a):
     return lambda t, u: [u[1], -math.sin(u[0]) - 0.5 * u[1] + a * math.cos(2 / 3 * t)]
 
 
+@pytest.mark.full
 def test_rotations_of_a_forced_pendulum():
     start, branch = locked()
     first = start.system.states(start.x)[0]
@@ -275,6 +276,7 @@ def test_splay_state_of_a_ring(symmetric):
     assert np.abs(whole[1] - whole[0] - TWO_PI).max() < 1e-9
 
 
+@pytest.mark.full
 def test_guesses_with_jumps():
     """Values between -pi and pi, as of data, and a guess whose lift is somewhere else."""
     start, _ = running()

@@ -133,6 +133,7 @@ def meridian(u, p):
     return (u.z - p.b) * u.r, p.lam + u.z - u.z**3 / 3 - u.r**2 * (1 + u.z / 4)
 
 
+@pytest.mark.full
 def test_tori_of_langford():
     """Tori are cycles of r and z: Hopf points at r**2 = 4 (1 - b**2), z = b, with the same frequency and l1.
 

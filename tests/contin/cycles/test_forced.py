@@ -44,7 +44,7 @@ def resonance(field, **values):
     return contin.trace(orbit, free=["w"], direction=-1, limits={"w": (0.3, 15)})
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("q", [1.0, 2.0])
 def test_edges_of_stability_of_mathieu(q):
     """x = 0 is a cycle for all a. A multiplier is 1 or -1 at the edges a_n(q), b_n(q), from SciPy: BP for even n, PD for odd n.
@@ -222,6 +222,7 @@ def locked():
     return contin.solve(problem, lambda t: tuple(run.sol(147 * period + 3 * period * t)), {"rounds": 3})
 
 
+@pytest.mark.full
 def test_a_loop_of_subharmonics_is_closed_when_it_has_gone_round():
     """In the tongue 1:3 the branch comes back a period of the forcing later: one loop, with the folds at which locking ends.
 

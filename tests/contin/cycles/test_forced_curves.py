@@ -154,7 +154,7 @@ def test_a_resonance_that_a_symmetry_makes_touch():
         assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("m1", [0.01, 0.5])
 def test_torus_bifurcations_end_on_a_symmetric_cycle(m1):
     """Cycles that have an image become their own: the curve would go back as its mirror image from a point where it is R1."""

@@ -36,6 +36,7 @@ def test_a_column_keeps_its_value():
     assert "Hopf point where the cycles have no size" in back.stop.message and abs(back.points[-1]["m"]) < 1e-2
 
 
+@pytest.mark.full
 def test_curves_of_branch_points_end_at_hopf_points():
     problem = contin.CycleProblem(field, ["x", "y", "z"], {"m": 0.25, "w": 0.9, "q": 0.4, "c": 0.49})
     branch = contin.trace(contin.solve(problem, start()), free=["m"], limits={"m": (0.1, 1)})

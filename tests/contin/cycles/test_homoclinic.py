@@ -14,6 +14,7 @@ def lorenz(u, p):
     return 10 * (u.y - u.x), p.r * u.x - u.y - u.x * u.z, u.x * u.y - 8 / 3 * u.z
 
 
+@pytest.mark.full
 def test_lorenz_ends_beside_the_origin():
     """The homoclinic orbit lies at r = 13.926557 (published). The origin has -8/3 and (-11 +- sqrt(81 + 40 r)) / 2."""
     side = math.sqrt(8 / 3 * 19)
@@ -123,6 +124,7 @@ FAMILIES = [
 ]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("field", "start", "mu", "limit", "longest", "known"), FAMILIES)
 def test_a_limit_lies_within_its_error_or_is_not_given(field, start, mu, limit, longest, known, request):
     angles = ["x"] if request.node.callspec.id.startswith(("rotations", "driven", "fold")) else []

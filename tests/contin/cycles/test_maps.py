@@ -105,6 +105,7 @@ def logistic_iterates(x, r, rounds):
     return np.array(points), x, product
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("which", [8, 11, 16, 18])
 def test_a_cycle_of_32_keeps_to_itself(which):
     """The stable one at r = 3.569, of which a branch may begin at any point; it doubles where plain arithmetic says.
@@ -203,6 +204,7 @@ def test_what_is_refused(statement, words):
         statement()
 
 
+@pytest.mark.full
 def test_curves_of_period_doublings_of_henon():
     """Of the fixed point at a = 3 (1 - b)^2 / 4, of the cycle of two points at a = (1 - b)^2 + (1 + b)^2 / 4; det = -b.
 

@@ -8,6 +8,7 @@ import pytest
 import contin
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("period", [pytest.param(250, marks=pytest.mark.full), 400])
 def test_they_grow_and_decay_with_the_period(period):
     """A driven pendulum: the mean of v is 2 pi / T, so that the logarithms are 0, -1.15 T and -5 T + .4 pi."""

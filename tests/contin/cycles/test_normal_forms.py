@@ -224,6 +224,7 @@ def test_of_a_fold_of_cycles(shear):
     assert fold.normal_form == pytest.approx(math.sqrt(2), abs=1e-9) and fold.name == "mu"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("field", "label", "name", "s"), [(moebius, "PD", "GPD", 0.72), (spiral, "TR", "CH", 0.52)])
 def test_where_the_coefficient_vanishes_on_a_curve(field, label, name, s):
     """At s = k h / 2 + h / 4 and s = k h / 2, from the two tests above."""

@@ -43,6 +43,7 @@ def fold(n=SIZE, residual=bratu, **given):
     return branch.labelled("LP")[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("n", [SIZE, pytest.param(250, marks=pytest.mark.full)])
 def test_the_fold_is_the_same(n):
     """Traced, and with a Jacobian, sparse and dense; from 200 states on the matrix is kept sparse."""

@@ -109,7 +109,7 @@ def random_crossing(seed):
     return Algebraic(AlgebraicProblem(equations, ["x", "y"], {"a": 0.0}), ["a"]), random
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_what_is_left_is_below_the_tolerance_be_it_large(tolerance):
     """At the origin; other crossings are further away. After one update the next says little of what is left."""

@@ -65,6 +65,7 @@ def test_every_branch_is_left_both_ways(equal):
     assert len({which for first, which, _ in apart if not first}) == 3
 
 
+@pytest.mark.full
 def test_a_diagram_follows_one_branch_of_each_conjugacy_class(equal):
     """The triangle's rotations and reflections turn the three lines into each other: two half-branches are left to follow."""
 
@@ -129,6 +130,7 @@ def test_a_circle_of_branches_is_said_to_be_one():
     assert abs(point["a"]) < 1e-9 and point.details.continuum and branch.stop.reason == "limit"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_error_of_a_cluster_reaches_its_ends(seed):
     """Eigenvalues that differ by 3e-6 are found as one point, moved off the branch by Gauss-Newton: both are within its ±."""

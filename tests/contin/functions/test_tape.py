@@ -264,6 +264,7 @@ GUARDED = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", GUARDED)
 def test_independent_guards_are_joined_one_by_one(name):
     """Twenty of them have a million paths or more; values and derivatives are those of Python on any of them."""

@@ -45,7 +45,7 @@ def arms_of(seed, both):
     return found, np.array(junction.details.tangents), np.array(junction.details.kernel), np.array([end.x for end in ends])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("both", [False, True])
 def test_arms_in_the_same_order(both):
     """A simple pitchfork, and a double one with four lines of arms (x, y and the diagonals)."""

@@ -35,6 +35,7 @@ def test_solutions_one_round_on_are_known():
         contin.solve(problem, [0.3, 0.0], others=[down, up])
 
 
+@pytest.mark.full
 def test_librations_know_the_angle():
     """From a Hopf point to the orbits that connect the saddle at -pi with itself, at pi, and back: two passes in a period."""
 

@@ -90,7 +90,7 @@ def test_the_first_interrupt_gives_the_branch_so_far(capsys):
     assert trace(branch.points[-1], free=["lam"], limits={"lam": (-1, 1)}).points[-1]["lam"] == pytest.approx(1)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["spawn", pytest.param("fork", marks=pytest.mark.forks("they are tested"))])
 def test_a_point_survives_pickling_into_another_process(method):
     point = trace(solve(PROBLEM, [0, 0]), free=["lam"], limits={"lam": (0, 0.5)}).points[-1]

@@ -163,6 +163,7 @@ def test_hopf_points_pass_a_zero_hopf_point():
             assert point["frequency"] == pytest.approx(2, abs=1e-10)
 
 
+@pytest.mark.full
 def test_torus_bifurcations_leave_a_zero_hopf_point():
     """At z = 0, b = 0 and rho**2 = -a the trace of the amplitude equations is zero, and their frequency sqrt(2) rho."""
     found = contin.curve(zero_hopf(1), kind="TR", primary="a", limits={"a": (-0.1, 1)})

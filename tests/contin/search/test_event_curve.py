@@ -99,6 +99,7 @@ def swallowtail():
     return curve(fold, "b", limits={"b": (-20, 20)}, zeros={"b": [1.0]})
 
 
+@pytest.mark.full
 def test_cusps_in_three_parameters():
     """a = -6 x^2, b = 8 x^3, c = -3 x^4, which come together in the swallowtail at the origin."""
     cusp = swallowtail().labelled("CP")[0]
@@ -127,6 +128,7 @@ def test_wrong_events():
         curve(start, "eps", event=Event("UZ", "cold", lambda trial: middle(trial) + 1.0))
 
 
+@pytest.mark.full
 def test_a_curve_ends_where_its_event_is_not_confirmed():
     """x = a b = 0.3 counts below b = 0.7 only."""
     plane = AlgebraicProblem(lambda u, p: (u.x - p.a * p.b,), ["x"], {"a": 1.0, "b": 0.5})

@@ -62,6 +62,7 @@ def test_demo_obv():
     assert third.details["least_curvature"] > 0  # a minimum
 
 
+@pytest.mark.full
 def test_the_turn_of_a_curve_of_extrema_is_no_extremum_in_two_parameters():
     """At a fold of the curve with respect to the new parameter the derivative along the curve vanishes, too."""
     found = curve(obv_branch().labelled("EX")[0], "l2", limits={"l2": (-1, 5), "objective": (0, 10)})

@@ -60,7 +60,7 @@ def cubic():
     return AlgebraicProblem(lambda u, p: (p.a * u.x - u.x**3 + p.e,), ["x"], {"a": -1.0, "e": 0.1})
 
 
-@pytest.mark.sample(1)  # each imperfection, each seed
+@pytest.mark.full  # each imperfection, each seed
 @pytest.mark.parametrize("e, seed", [((0.3, 0.1, 1e-3)[(seed + k) % 3], seed) for seed in range(3) for k in range(3)])
 def test_the_other_branch_of_an_imperfect_pitchfork(e, seed):
     values = [-0.5, 0.0, 1.0, 1.7]
@@ -73,6 +73,7 @@ def test_the_other_branch_of_an_imperfect_pitchfork(e, seed):
         assert at(found, "a", value, "x") == pytest.approx(np.sort(roots[np.abs(roots.imag) < 1e-9].real), abs=1e-8)
 
 
+@pytest.mark.full
 def test_the_same_seed_finds_the_same():
     start = solve(cubic(), [0.0])
     found, again = (diagram(start, free=["a"], limits={"a": (-1, 2)}, search=Search([0.0, 1.7], seed=1)) for _ in range(2))
@@ -90,6 +91,7 @@ def test_no_solution_twice():
     assert len(found.branches) == 2 * 9
 
 
+@pytest.mark.full
 def test_a_solution_that_belongs_to_a_known_branch_is_connected_with_it():
     """Branches beyond the depth: a search finds one, and the diagram knows where it meets the others."""
     fork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
@@ -191,6 +193,7 @@ def test_states_of_an_energy():
     assert sorted({point.index for point in points}) == [0, 1]
 
 
+@pytest.mark.full
 def test_the_order_of_values_changes_nothing():
     """What is found at one value is a guess at those beside it, before and after it."""
     told = [repr(diagram(solve(line_and_circle(), [0.0]), free=["a"], limits={"a": (0, 2)}, search=Search(values, draws=1)))

@@ -57,6 +57,7 @@ def trace_and_coefficient(v, rate):
     return A[0, 0] + A[1, 1], mpmath.re((left.T * total)[0]) / (2 * omega)
 
 
+@pytest.mark.full
 def test_generalized_hopf_point_of_morris_lecar():
     problem = AlgebraicProblem(morris_lecar, ["v", "w"], {"current": 0.0, "rate": 0.04, "g": 4.4, "v1": 1.2})
     branch = contin.trace(contin.solve(problem, [-60.0, 0.0]), free=["current"], limits={"current": (-10, 300)})

@@ -170,6 +170,7 @@ def equilibrium(x, alpha):
     return delta, a + d, a * d - b * c
 
 
+@pytest.mark.full
 def test_of_bazykin():
     """Predators and prey (Bazykin 1985; Kuznetsov, section 8.4): BT points by another solver, from formulas of x and alpha."""
     from scipy.optimize import fsolve
@@ -206,6 +207,7 @@ def test_of_the_reactor_of_the_ab_demo():
             assert p2 * x - 1 / (1 - x) - 1 - p3 == pytest.approx(0, abs=1e-8)
 
 
+@pytest.mark.full
 def test_of_the_reactor_of_the_abc_demo():
     """From Hopf points at beta = 1.55 to those at 1.57 and 1.21, which the bank knows to 30 digits; BT on both curves."""
     zeros = {"beta": [1.21, 1.57]}

@@ -89,6 +89,7 @@ def test_deflation_from_many_guesses(lam, guess):
     assert middle(second) == pytest.approx(bratu_middles(lam)[1], abs=1e-8)
 
 
+@pytest.mark.full
 def test_where_all_solutions_are_known_there_is_no_further_one():
     first = lower(1.0, 6)
     second = solve(bratu(), [0, 0.1], {"lam": 1.0}, degree=6, others=[first])
@@ -126,6 +127,7 @@ def test_square_roots_of_any_size(a, guess):
         assert a > 1 or guess < math.sqrt(a)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("a", [-1e-60, -1e-30])
 def test_what_has_no_root_is_not_solved(a):
     problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": a})

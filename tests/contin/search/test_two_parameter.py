@@ -83,6 +83,7 @@ def test_a_curve_of_folds_ends_at_a_pitchfork():
     assert (end["a"], end["mu"], end.x[0]) == pytest.approx((0, 0, 0), abs=1e-12)
 
 
+@pytest.mark.full
 def test_a_curve_of_folds_ends_at_the_pitchfork_of_a_boundary_value_problem():
     """u'' + lam (u + c u^3 - u^5) = 0 with u = 0 at both ends branches off u = 0 at pi^2, downwards where c > 0."""
     problem = BoundaryValueProblem(
