@@ -24,6 +24,7 @@ def test_every_file_that_the_page_names_exists():
     assert not [name for name in NAMED if not (PROJECT / name).exists() and not (PACKAGE / name).exists()]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("package", ["contin", "ribbon_model", "branches"])
 def test_every_module_is_in_a_table_with_its_purpose(package):
     modules = runpy.run_path(str(PROJECT / "scripts" / "site" / "modules.py"))
@@ -57,6 +58,7 @@ def test_there_are_steps():
     assert len(STEPS) > 20
 
 
+@pytest.mark.full
 def test_the_picture_is_true():
     rooms = runpy.run_path(str(PROJECT / "scripts" / "draw_rooms.py"))
     picture = (DOCS / "images" / "rooms.svg").read_text()

@@ -39,6 +39,7 @@ def imported(*packages):
     return found - set(sys.stdlib_module_names) - {"contin", "ribbon_model", "branches"} - NOT_DECLARED
 
 
+@pytest.mark.full
 def test_contin_declares_what_it_imports_and_nothing_else():
     extras = [requirement for extra in ALONE["project"]["optional-dependencies"].values() for requirement in extra]
     assert imported("contin") == {*names(ALONE["project"]["dependencies"]), *names(extras)}
@@ -73,6 +74,7 @@ def test_the_conda_recipe_has_the_same_bounds():
         assert bounds == dict(re.match(r"([\w-]+)(.*)", line.lower()).groups() for line in project["dependencies"])
 
 
+@pytest.mark.full
 def test_the_example_of_the_distribution_contin_runs():
     assert doctest.testfile(str(ROOT / "packages/contin/README.md"), module_relative=False).failed == 0
 
@@ -113,6 +115,7 @@ def test_a_missing_library_is_named_with_what_to_do(library, call, monkeypatch):
     assert "<table>" in branch._repr_html_()  # without a picture where matplotlib is missing
 
 
+@pytest.mark.full
 def test_import_loads_nothing_that_is_optional():
     code = "import sys, contin; contin.trace; print(sorted({'matplotlib', 'pandas', 'networkx'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT).stdout == "[]\n"

@@ -152,6 +152,7 @@ def test_everything_is_printed_on_a_screen_and_without_addresses(objects):
     assert len(kinds) > 70
 
 
+@pytest.mark.full
 def test_every_public_class_is_among_them(objects):
     public = [getattr(module, name) for module in (contin, lowlevel, auto07p, ribbon_model) for name in module.__all__]
     kinds = {type(thing) for thing in objects}
@@ -159,6 +160,7 @@ def test_every_public_class_is_among_them(objects):
     assert not missing
 
 
+@pytest.mark.full
 def test_html_is_well_formed(objects):
     shown = [thing for thing in objects if hasattr(thing, "_repr_html_")]
     assert {type(thing).__name__ for thing in shown} >= {"Branch", "Diagram", "Point", "ClosedBranch", "OpenBranch"}

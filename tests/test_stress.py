@@ -13,9 +13,9 @@ def stress(*words):
     return subprocess.run([sys.executable, SCRIPT, *words], capture_output=True, text=True, timeout=600)
 
 
-def test_some_problems(request):
-    count, most = ("60", "30") if request.config.getoption("--full") else ("12", "6")
-    done = stress("--count", count, "--first", "96", "--most", most)
+@pytest.mark.parametrize("count, most", [(4, 4), pytest.param(60, 30, marks=pytest.mark.full)])
+def test_some_problems(count, most):
+    done = stress("--count", str(count), "--first", "96", "--most", str(most))
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert f"{count} problems, " in done.stdout and "0 problems with faults" in done.stdout
 
@@ -28,5 +28,6 @@ def test_two_branch_points_in_a_step_that_begins_beside_the_first():
     assert "4 right or noted" in done.stdout and "0 noted" in done.stdout
 
 
+@pytest.mark.full
 def test_bad_usage():
     assert stress("--count", "0").returncode == 2

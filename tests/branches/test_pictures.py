@@ -127,11 +127,12 @@ def test_a_horizontal_strip_is_horizontal_and_its_clamp_stays_where_it_is(tmp_pa
 
 
 def test_a_scale_is_a_round_length(stroke):
-    first = figure(stroke, 3).subfigs[0].axes[0]
+    made = figure(stroke, 2).subfigs[0]
+    first = made.axes[0]
     (bar,) = first.lines
     (words,) = [text.get_text() for text in first.texts]
     assert words == "0.1 m" and np.ptp(bar.get_xdata()) == pytest.approx(0.1 / 0.3)  # the strip has length 1 there
-    assert not any(axes.lines for axes in figure(stroke, 3).subfigs[0].axes[1:])
+    assert not any(axes.lines for axes in made.axes[1:])
     seen = figure(stroke, 1, view=(-90.0, 90.0)).subfigs[0].axes[0].images[0].get_array()
     assert np.count_nonzero(seen[..., 3].any(axis=1)) < 30  # from above, an arch is a line
 
@@ -327,6 +328,7 @@ def test_the_title_is_that_of_the_data(tmp_path):
 # --- one branch -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_negative_numbers_have_minus_signs_and_fonts_can_be_edited(tmp_path):
     branch = branch_of(tmp_path, "{m: 1, n: 3}")
     made = figure(branch, shapes=0)

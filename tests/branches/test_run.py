@@ -490,6 +490,7 @@ def test_the_moving_line_fits_the_terminal(columns, tmp_path, silent, monkeypatc
     assert columns < 80 or any("step" in line and "error" in line and "points/s" in line for line in drawn)
 
 
+@pytest.mark.full
 def test_on_a_terminal(command, scene):
     shown = command.on_terminal(scene, streams=("stdout", "stderr"), env={"COLUMNS": "20"})
     assert b"fold at kappa_n" in shown and b"Traceback" not in shown

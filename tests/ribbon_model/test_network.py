@@ -241,6 +241,7 @@ def test_a_cut_by_rigid_joints_changes_nothing(name, cuts):
     np.testing.assert_allclose(moment, [known[f"start_M_{x}"] for x in ("width", "normal", "tangent")], atol=1e-8)
 
 
+@pytest.mark.full
 def test_joints_turned_and_with_gaps_are_closed_step_by_step():
     """An arc is bent to a loop by a joint that leaves a corner of 40 degrees between its ends."""
     strip = Member("strip", strains=(1.0, 0.0, 0.0))

@@ -84,6 +84,7 @@ def test_it_is_a_pressure_against_the_normals_of_strips(slide, against):
     assert np.linalg.norm(places[0] - found[0][0].drawn_place("B")) > 0.04
 
 
+@pytest.mark.full
 def test_a_portal_is_in_balance_however_its_columns_are_drawn():
     corners = [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (0.0, 0.0, 1.0)]
     members = [straight("strip", a, b, (0.0, b[2] - a[2], a[1] - b[1])) for a, b in zip(corners, corners[1:])]

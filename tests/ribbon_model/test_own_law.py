@@ -222,6 +222,7 @@ def test_the_planar_elastica():
     assert length == pytest.approx(1, abs=1e-8)
 
 
+@pytest.mark.full
 def test_buckling_of_straight_strips():
     """Where it is straight, its tangent moduli are 1 and the twist: Euler's load, and Michell's (1899)."""
     section = Section(LAW, NUMBERS)

@@ -61,7 +61,7 @@ def test_circles_against_the_linear_theory():
                 assert found.index == linear.index(law, m, kappa_n, NU), (law.name, m, kappa_n)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=list(PAPER_LAWS))
 def test_circles_by_conjugate_points(law):
     for m, kappa_n in ((1, 2.7), (1, 3.25), (3, -1.3), (3, 2.2), (3, -7.1)):

@@ -35,6 +35,7 @@ def test_every_primary_bifurcation_is_passed_and_reported(circle):
     assert circle.stop.reason == "limit"
 
 
+@pytest.mark.full
 def test_with_a_phase_the_branch_is_followed_from_there(circle):
     """M3 = 0 at S = 0 and ``unfold`` take one solution of each circle: its fold is that of the cell (quadrature)."""
     point = next(point for point in circle if point.label == "BP")

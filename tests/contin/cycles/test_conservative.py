@@ -75,6 +75,7 @@ def vertical_trace(point):
     return end[4] + end[7]
 
 
+@pytest.mark.full
 def test_unstable_multipliers_of_the_family(lyapunov_family):
     """One of the planar pair is outside, and one of the vertical pair where that is real; never the second 1."""
     first, second, third = (point["period"] for point in lyapunov_family if point.label in ("BP", "PD"))
@@ -84,6 +85,7 @@ def test_unstable_multipliers_of_the_family(lyapunov_family):
             assert point.floquet().unstable == 1 + real
 
 
+@pytest.mark.full
 def test_no_normal_form_at_a_doubling_in_a_family(lyapunov_family):
     """Its equations are singular, as a second multiplier is 1: a number was printed, 8e12, that is nothing but error."""
     (doubling,) = lyapunov_family.labelled("PD")

@@ -241,6 +241,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("cache")
 
 
+@pytest.mark.full
 def test_a_second_process_needs_no_compiler(folder, tmp_path):
     """Machine code on disk needs neither numba nor SciPy: loading them would take longer than most runs."""
     problem = tmp_path / "problem.py"
