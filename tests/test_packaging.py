@@ -105,6 +105,7 @@ MISSING = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("library", "call"), MISSING.items())
 def test_a_missing_library_is_named_with_what_to_do(library, call, monkeypatch):
     line = contin.AlgebraicProblem(lambda u, p: (u.x - p.p,), ["x"], {"p": 1.0})

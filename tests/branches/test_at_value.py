@@ -106,6 +106,7 @@ def test_a_file_that_cannot_be_read_gives_the_interpolated_digits(folder, tmp_pa
     assert {state.source for state in on_branch(states, (3, 5))} == {SOLVED}
 
 
+@pytest.mark.full
 def test_another_state_is_not_taken_for_the_one_that_was_interpolated(folder, monkeypatch):
     """Newton's method may arrive at another branch; here it is made to."""
     monkeypatch.setattr(at_value, "solved", lambda *_: ({"kappa_star": 2.9, "energy": -4.0}, {"kappa_star": 0, "energy": 0}))

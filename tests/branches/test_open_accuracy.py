@@ -52,6 +52,7 @@ def test_a_first_stage_that_starts_outside_its_limits_is_refused(stages, sentenc
     assert sentence in str(caught.value)
 
 
+@pytest.mark.full
 def test_a_later_stage_that_starts_outside_its_limits_ends_the_run(tmp_path):
     scene = f"{ARCH}stages: [{{follow: distance, to: 0.9}}, {{follow: turn, to: 1, limits: {{distance: [0.92, 1]}}}}]\n"
     outcome, branch = followed(scene, tmp_path)

@@ -92,6 +92,7 @@ def test_verdicts_are_those_of_the_printed_digits():
     assert Row("", "3.50", 2.5, measured=True).verdict == "" and Row("", "none", 2.5).verdict == ""
 
 
+@pytest.mark.full
 def test_an_item_alone_loads_and_writes_what_it_needs(command):
     code = "import sys; from branches.paper.__main__ import main; assert main(['--out', 'x', 'table3']) == 0; "
     done = command(program=("-c", code + "assert not {'numba', 'matplotlib', 'h5py'} & set(sys.modules), sorted(sys.modules)"))

@@ -111,6 +111,7 @@ def stroke(tmp_path_factory):
     return branch_of(tmp_path_factory.mktemp("stroke"), STROKE)
 
 
+@pytest.mark.full
 def test_a_horizontal_strip_is_horizontal_and_its_clamp_stays_where_it_is(tmp_path):
     """The cantilever begins along the horizontal and sinks; at weight 0 it is a horizontal line from end to end."""
     branch = branch_of(tmp_path, HEAVY)
@@ -179,6 +180,7 @@ def test_views_that_there_are_not(call, stroke, tmp_path, angles):
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.full
 def test_a_film_shows_the_graph_of_the_stage(stroke):
     """The words below the axes: those of one stage for its points, other ones for those of the next stage."""
     points = [0, 4, len(stroke.points) - 1]
@@ -315,6 +317,7 @@ def test_a_line_says_why_it_ends():
     assert words[-1] == "a line ends: the end of the convex strain energy"
 
 
+@pytest.mark.full
 def test_the_legend_of_the_isotropic_rod_says_which_circle_is_stable_and_why(previews):
     words = [handle.get_label() for handle in legend(previews["isotropic rod"], "isotropic rod", 0.3)]
     assert "circle, stable (a minimum of the energy)" in words and "circle, stable to waves, but it turns inside out" in words

@@ -216,6 +216,7 @@ def test_a_case_of_finite_elements_is_counted(tmp_path, monkeypatch):
     assert lines(terminal.getvalue())[-1].startswith("2 of 2 cases done")
 
 
+@pytest.mark.full
 def test_the_items_of_the_paper_on_a_terminal(command):
     shown = shown_on_a_terminal(command, "--out", "x", "table3", "table1", program=("-m", "branches.paper"))
     assert any("1 of 2 items done" in line and "to go: table1" in line for line in shown)

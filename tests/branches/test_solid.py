@@ -200,6 +200,7 @@ def test_a_scene_is_exported_with_its_volume(name, result, tmp_path):
         assert sorted(written.extents) == pytest.approx([0.5, 10, 400], rel=1e-6)
 
 
+@pytest.mark.full
 def test_the_width_of_the_dimensions_is_that_of_the_export(result, tmp_path, capsys):
     trimesh = pytest.importorskip("trimesh")
     for options, length in (([], 0.4), (["--length", "400"], 400)):

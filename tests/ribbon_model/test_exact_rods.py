@@ -170,6 +170,7 @@ def test_both_ends_see_the_same_branch():
     assert (same.kappa_star, same.amplitude, same.energy) == pytest.approx((-at.kappa_star, at.amplitude, at.energy), rel=1e-11)
 
 
+@pytest.mark.full
 def test_isotropic_rod_without_poisson_effect():
     """nu = 0: M_1 is constant, M_3 harmonic: kappa_n = +-n all along the branch, U^2 + A = (m/n -+ 1)^2."""
     for root, sense in ((0, 1), (1, -1)):

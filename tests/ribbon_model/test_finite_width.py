@@ -126,6 +126,7 @@ def test_derivatives_of_the_energy(Gamma):
 # --- the Legendre transform -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("Gamma", (0.0, 0.3, 3.0, 30.0, 3e3, 1e6))
 def test_the_response_inverts_the_energy(Gamma):
     random = np.random.default_rng(3)

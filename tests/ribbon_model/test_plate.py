@@ -50,6 +50,7 @@ def plate_energy(k1, k2, k12, D):
     return (D[0] * k1**2 + 2 * D[1] * k1 * k2 + D[2] * k2**2 + 4 * D[3] * k12**2) / 2
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("D", PLATES)
 @pytest.mark.parametrize(("M1", "M3", "kappa_n"), [moment for moment in MOMENTS if moment[2] >= 0])
 def test_the_ribbon_is_the_plate_of_vanishing_gaussian_curvature(D, M1, M3, kappa_n):

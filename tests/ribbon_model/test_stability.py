@@ -134,6 +134,7 @@ def test_a_hard_state():
     assert one.index == other.index == 5
 
 
+@pytest.mark.full
 def test_thresholds_of_circles_are_zeros():
     """Where (25b) of the paper has b = 0 the index of the circle changes, in the class of the wavenumber, to 1e-10."""
     cases = [(law, m, n, None) for law in PAPER_LAWS.values() for m in (1, 3, 5) for n in range(1, 9) if n != m]
@@ -229,6 +230,7 @@ def test_a_change_of_index_is_located():
     assert place == pytest.approx(leaves["kappa_n"], abs=1e-9)
 
 
+@pytest.mark.full
 def test_two_directions_change_at_once():
     """On (5, 2) they are a pair: a class that comes twice."""
     results = [index(equilibrium(point)) for point in between_ends(branch(5, 2))]

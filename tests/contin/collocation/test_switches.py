@@ -81,7 +81,7 @@ def slope_at_start(law, levels, near, q=2.0):
     return brentq(late, near - 0.02, near + 0.02, xtol=1e-14)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("degree", [3, 7])
 def test_conditions_on_a_state(name, degree):

@@ -95,6 +95,7 @@ def curve(direction):
     return contin.trace(central(), free=["K", "G"], direction=direction, limits={"K": (1, 20)})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_central_orbits_end_at_non_central_ones(direction):
     found = curve(direction)

@@ -156,6 +156,7 @@ def test_most_steps_are_plain(name, count, monkeypatch):
     assert len(careful) <= count < len(points)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["Lorenz", "snake", "Henon", "user's points", "large sizes"])
 def test_a_run_goes_on_from_any_state(name):
     system, x, settings = start(name)
@@ -175,6 +176,7 @@ def test_a_run_goes_on_from_any_state(name):
             assert one.arclength == pytest.approx(other.arclength, rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("most", [1, 2, 9, 10, 11, 40])
 def test_max_points(most):
     points, run = made("snake", max_points=most)

@@ -12,6 +12,7 @@ def reactor(u, p):
     return (1 - u.a) / p.tau - rate, rate - u.b / p.tau - p.k * u.b
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("k", [0.03, 0.04, 0.05])
 def test_both_folds_of_an_isola(k, direction):

@@ -17,6 +17,7 @@ def complaints(name, seed, stated=False):
     return {case: what for case, what in found.items() if what and case not in KNOWN}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", QUICK)
 def test_some_in_other_units(name):
     assert complaints(name, 0) == {}

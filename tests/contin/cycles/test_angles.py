@@ -86,6 +86,7 @@ def apart_of_manifolds(current, beta):
     return at_half(1) - at_half(-1)
 
 
+@pytest.mark.full
 def test_running_solutions_end_at_an_orbit_that_is_homoclinic_on_the_circle():
     _, branch = running()
     last = branch.points[-1]

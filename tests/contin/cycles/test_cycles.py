@@ -93,6 +93,7 @@ def test_a_fold_of_cycles():
         assert np.abs(values - np.sort([0, 4 * math.pi * (s - 2 * s * s)])).max() < 1e-8
 
 
+@pytest.mark.full
 def test_van_der_pol_to_a_multiplier_that_no_number_holds():
     """Periods: published, 6.6632868593 at mu = 1 and 19.0783695 at mu = 10. Liouville gives their product."""
     orbit = contin.cycle(CycleProblem(van_der_pol, ["x", "v"], {"mu": 1.0}), [0.1, 0.0])

@@ -52,6 +52,7 @@ def test_a_fast_cycle_is_near_nothing():
     assert resting_place(orbit.system, orbit.x) is None
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("longest", [4, 7])
 def test_the_parameter_is_extrapolated(longest):
     """r = 13.926557407520 where the period is infinite, to 14 digits; the error covers the difference."""

@@ -32,6 +32,7 @@ def exact(angle, b, size=1.0, rate=1.0):
     return np.stack([-y - b * x, x - b * y], axis=1) / (size * rate * (3 - b))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("b", [0.0, 0.7, -2.0])  # the radial isochron clock, and with shear both ways
 @pytest.mark.parametrize("options", [{}, {"intervals": 6, "mesh": contin.MeshControl(every=0)}, {"degree": 7}])
 def test_of_stuart_and_landau(b, options):

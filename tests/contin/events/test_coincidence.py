@@ -46,6 +46,7 @@ def test_round_numbers_at_a_pitchfork(name, given):
     assert all(abs(point["a"]) < 1e-12 for point in branch.points if point.label in ("BP", "UZ"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("value", [FOLD, FOLD * (1 - 1e-15), FOLD * (1 + 1e-15)])
 def test_a_zero_at_a_fold_is_one_point(value):
     """Below the fold's value the branch passes it twice, above never; to round-off it is the fold."""

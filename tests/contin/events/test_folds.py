@@ -128,7 +128,7 @@ def test_folds_on_both_sides_of_a_pitchfork(apart, step):
         assert abs(point["X"]) == pytest.approx(apart, abs=1e-7)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("factor", [lambda u, s: 1, lambda u, s: 1 + u**2, lambda u, s: 1 + s])
 def test_a_vertical_branch_of_a_discretized_column_has_no_folds(factor):
     """(u'''' + lam u'') f(u) = 0 by differences: at a load all amplitudes solve it. Round-off of the load is 1e-11 and more.

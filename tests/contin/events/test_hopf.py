@@ -107,6 +107,7 @@ def test_pairs_that_cross_one_after_the_other(gap):
     assert all(abs(point["mu"] - exact) <= 10 * point.errors["mu"] < 1e-12 for point, exact in zip(points, (0, gap)))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("start", [-1.0, -0.9, -0.73])
 @pytest.mark.parametrize(("w", "c"), [(2.0, 1.0), (1.5, 1.0), (2.0, 0.5)])
 def test_pairs_that_cross_at_one_place(start, w, c):

@@ -123,6 +123,7 @@ def test_an_arm_of_a_hyperbola_turns_back(gap, branch_points):
     assert branch.labelled("LP")[0]["a"] == pytest.approx(-gap, rel=1e-8)
 
 
+@pytest.mark.full
 def test_a_thin_closed_branch_of_cycles():
     """(q - 1)^2 + 1e4 (a - 1)^2 = 0.04, q the squared radius: the period turns by 3 times a, and weighs 0.006 in the norm."""
 

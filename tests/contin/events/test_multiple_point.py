@@ -50,6 +50,7 @@ def test_the_run_passes_a_double_branch_point(equal):
     assert abs(point["lam"] - DOUBLE) < max(10 * point.errors["lam"], 1e-12) < 1e-9
 
 
+@pytest.mark.full
 def test_every_branch_is_left_both_ways(equal):
     """Four lines meet: equal cells, and for each cell two others that stay equal to each other (the triangle's reflections)."""
     (point,) = equal.labelled("BP")

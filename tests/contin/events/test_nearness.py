@@ -40,6 +40,7 @@ def test_multipliers_of_a_longer_round():
         assert not near([15, -60], [5, -20], what, longer=1 / 3)
 
 
+@pytest.mark.full
 def test_multipliers_of_a_cycle_that_rests():
     """In the plane one is 1 and the other exp of the integrated divergence, however long the cycle rests at a saddle.
 

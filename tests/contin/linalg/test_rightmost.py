@@ -18,6 +18,7 @@ def turning(frequency, growth, seed):
     return matrix
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("frequency", [0.3, 5.0, 300.0])
 @pytest.mark.parametrize("growth", [0.01, -0.01])
 def test_all_beside_the_axis_are_found(frequency, growth):

@@ -81,6 +81,7 @@ def test_where_newton_fails_the_sentence_says_what_helps():
 # --- deflation ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("lam", [1.0, 2.0, 3.0])
 @pytest.mark.parametrize("guess", ([0, 0.1], [1, 0], [0.3, 0.1], None))
 def test_deflation_from_many_guesses(lam, guess):
