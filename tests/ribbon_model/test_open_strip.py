@@ -115,7 +115,7 @@ LATERAL = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("load, place, stiffness", [("force_width", "shear", 4.0), ("force_normal", "rise", 1.0)])
 @pytest.mark.parametrize("tension", [0.0, 2.0, -1.0])
 def test_the_tip_of_a_cantilever_goes_where_a_small_force_pulls(load, place, stiffness, tension):
