@@ -6,7 +6,7 @@
 It shows that a change of the code changed no number: record before and after, on the same machine with the same versions, and
 compare. A record is of the tree that this file lies in, wherever it is started from and whatever else is installed: every scene
 of configs/ by the commands of `branches`, with its secondary branches, and every point of every case of the
-bank of reference problems below tests/. All code is compiled afresh for it, and computes on one thread.
+bank of reference problems (bank/). All code is compiled afresh for it, and computes on one thread.
 
 Exit code: 0 recorded, or identical; 1 something differs; 2 bad usage, a file that cannot be used, a scene that cannot be run.
 (``--bank OUT.npz``, by which ``record`` runs the bank in a process of its own, takes compiled code from the usual caches.)
@@ -129,7 +129,7 @@ def of_file(key: str, path: Path) -> Record:
 
 def environment(folder: Path) -> dict[str, str]:
     """Return the environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
-    paths = filter(None, [str(ROOT), str(bank_folder().parent), os.environ.get("PYTHONPATH", "")])
+    paths = filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")])
     caches = {"CONTIN_CACHE_DIR": str(folder / "contin")}
     changes = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONIOENCODING": "utf-8", "COLUMNS": "80"}
     return os.environ | ONE_THREAD | caches | changes
@@ -191,18 +191,9 @@ def scene(path: Path, folder: Path, env: dict[str, str]) -> Record:
 # --- the bank ---------------------------------------------------------------------------------------------------------
 
 
-@functools.cache
-def bank_folder() -> Path:
-    """Return the folder of the bank of reference problems below tests/."""
-    found = sorted((ROOT / "tests").glob("**/bank/case.py"))
-    if len(found) != 1:
-        raise CompareError(f"{ROOT / 'tests'} must hold one bank/case.py, not {len(found)}")
-    return found[0].parent
-
-
 def bank_modules() -> list[str]:
     """Return the modules of the bank that have cases."""
-    files = sorted(bank_folder().glob("*.py"))
+    files = sorted((ROOT / "bank").glob("*.py"))
     return [file.stem for file in files if re.search(r"^CASES\b", file.read_text(encoding="utf-8"), re.MULTILINE)]
 
 
@@ -404,7 +395,7 @@ def output(text: str) -> Path:
 
 def bank_alone(path: Path) -> None:
     """Record the bank in this process, which must see this tree's packages and none installed elsewhere."""
-    sys.path[:0] = [str(ROOT), str(bank_folder().parent)]
+    sys.path.insert(0, str(ROOT))
     contin = importlib.import_module("contin")
     if ROOT not in Path(contin.__file__).resolve().parents:
         raise CompareError(f"{contin.__file__} is imported, which is not below {ROOT}")

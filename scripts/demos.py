@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parent
-sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent), str(SCRIPTS.parent / "tests" / "contin")]
+sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent)]
 #: AUTO's recorded runs of all demos.
 RECORDED = SCRIPTS / "side_by_side" / "auto_07p.json"
 #: Most seconds of one demo in contin.

@@ -18,7 +18,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(Path(__file__).parent))  # for `printed`
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]  # for `printed`, and for the bank of reference problems
 #: The modules that take longest, some six seconds or more, in order. They are handed out first: what comes last must be short,
 #: or one worker ends long before the other.
 FIRST = (

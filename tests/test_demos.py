@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).parent.parent
-sys.path[:0] = [str(PROJECT / "scripts"), str(PROJECT / "tests" / "contin")]
+sys.path.insert(0, str(PROJECT / "scripts"))
 
 import demos as command  # noqa: E402
 from side_by_side import auto_07p, compare, page  # noqa: E402

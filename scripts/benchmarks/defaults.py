@@ -10,14 +10,13 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
 
 import contin
-from benchmarks.measure import SCRIPTS, median
+from benchmarks.measure import median
 
 #: Degrees and tolerances besides the defaults.
 SETTINGS = (*((degree, 1e-12) for degree in range(4, 9)), *((degree, 1e-8) for degree in (5, 6, 7)))
@@ -48,7 +47,6 @@ class _Bank:
     """The modules of the bank, run at other settings than they state."""
 
     def __init__(self) -> None:
-        sys.path.insert(0, str(SCRIPTS.parent / "tests" / "contin"))
         table = importlib.import_module("bank.table")
         self.modules = [importlib.import_module(f"bank.{name}") for name in (*table.BANK, *table.OUTSIDE)]
         self.options: dict = {}

@@ -167,7 +167,6 @@ def _of_bank() -> Iterator[tuple[str, Any, Any, Any, Any]]:
     """The boundary value problems of the test bank, and cycles of its small vector fields, at states near .5."""
     import contin
 
-    sys.path.insert(0, str(Path(contin.__file__).parent.parent / "tests" / "contin"))
     table = importlib.import_module("bank.table")
     random = np.random.default_rng(1)
     for module in (importlib.import_module(f"bank.{name}") for name in (*table.BANK, *table.OUTSIDE)):

@@ -6,10 +6,10 @@ import functools
 import math
 
 import numpy as np
-from bank import stw as stw_front
 from scipy.integrate import solve_ivp
 
 import contin
+from bank import stw as stw_front
 from contin import AlgebraicProblem, ConnectionProblem
 from side_by_side.record import Demo, Part
 

@@ -9,7 +9,7 @@ OTHERS = (
     (
         "bru", "a parabolic partial differential equation",
         "It is integrated in time. contin follows solutions, and does not integrate partial differential equations. "
-        "Steady states of its reaction are in the bank (`tests/contin/bank/bru.py`).",
+        "Steady states of its reaction are in the bank (`bank/bru.py`).",
     ),
     (
         "ivp", "an initial value problem",

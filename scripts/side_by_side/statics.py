@@ -17,7 +17,7 @@ from side_by_side.record import Demo, Part
 
 
 def bank(name: str):
-    """Return a module of the bank of reference problems, tests/contin/bank."""
+    """Return a module of the bank of reference problems."""
     return importlib.import_module(f"bank.{name}")
 
 

@@ -1,4 +1,4 @@
-"""Makes the bank of reference problems (tests/contin/bank) importable as ``bank``."""
+"""Makes importable what tests of cycles and of connections compare with: tests/contin/cycles/noted.py."""
 
 import sys
 from pathlib import Path

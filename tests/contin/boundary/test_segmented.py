@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu_fold
 from scipy.optimize import brentq
 from scipy.special import erf
 
+from bank.closed_forms import bratu_fold
 from contin import ProblemError, Segment, SegmentedProblem, solve, trace
 
 

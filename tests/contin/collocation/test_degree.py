@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from bank import spb
 from bank.closed_forms import bratu, bratu_fold
-
 from contin import BoundaryValueProblem, MeshControl, solve, trace
 from contin.collocation import mesh as degree
 from contin.collocation.mesh import share, usual_degree

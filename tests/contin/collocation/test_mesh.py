@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu
 
+from bank.closed_forms import bratu
 from contin import BoundaryValueProblem, MeshControl, Settings, solve, trace
 from contin.collocation.mesh import adapted_mesh, density
 from contin.lowlevel import Collocation, basis, point_of

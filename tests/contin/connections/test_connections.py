@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bank import stw
 
+from bank import stw
 from contin import AlgebraicProblem, ConnectionProblem, CycleProblem, ProblemError, homoclinic, load, save, solve, trace
 
 

@@ -4,6 +4,7 @@ The true errors of the same runs are compared with the error estimates.
 """
 
 import pytest
+
 from bank.case import bank, check
 from bank.table import BANK, OUTSIDE
 

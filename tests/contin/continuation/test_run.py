@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, bratu_mean, elastica, two_elasticas
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
+from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, bratu_mean, elastica, two_elasticas
 from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Event, ProblemError, Settings, solve, trace
 from contin.lowlevel import Collocation, Continuation, point_of
 

@@ -1,6 +1,7 @@
 """Runs in other units: the bank with every state, parameter, functional and equation multiplied by 10^U(-9, 9)."""
 
 import pytest
+
 from bank import units
 
 #: A boundary value problem that starts from rest, and equilibria with folds, Hopf points and branch switching: those that

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu
 from scipy.optimize import brentq
 
 import contin
+from bank.closed_forms import bratu
 from contin.core.newton import correct
 
 #: A layer of this width at t = c.

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu, buckling_loads, elastica, parabola, pitchfork, two_elasticas
 
+from bank.closed_forms import bratu, buckling_loads, elastica, parabola, pitchfork, two_elasticas
 from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Newton, solve, trace
 from contin.lowlevel import Algebraic, Collocation, MultiplePoint, locate_branch_point
 

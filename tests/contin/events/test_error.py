@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from bank import closed_forms
 from scipy.optimize import brentq
 
 import contin
+from bank import closed_forms
 from contin import ProblemError
 from contin.lowlevel import levels
 

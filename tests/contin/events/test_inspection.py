@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
+
 from bank import abc, enz, pp2
 from bank.closed_forms import bratu, bratu_fold, pitchfork
-
 from contin import AlgebraicProblem, CycleProblem, Event, Settings, solve, trace
 
 

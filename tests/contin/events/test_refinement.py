@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+
 from bank import abc, bru
 from bank.case import UNDERRATED
 from bank.closed_forms import bratu
-
 from contin import BoundaryValueProblem, ConvergenceError, Settings, solve, trace
 from contin.core.trial import Linearization, Trial
 from contin.events import refinement

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_mean, parabola
 from scipy.optimize import brentq
 
 import contin
+from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_mean, parabola
 
 
 @pytest.fixture(scope="module")

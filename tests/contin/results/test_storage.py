@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bank.closed_forms import elastica, parabola
 
+from bank.closed_forms import elastica, parabola
 from contin import (
     AlgebraicProblem,
     BoundaryValueProblem,

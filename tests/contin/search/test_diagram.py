@@ -1,8 +1,8 @@
 """Branch switching and whole diagrams, against closed forms."""
 
 import pytest
-from bank.closed_forms import buckling_loads, elastica, elastica_load
 
+from bank.closed_forms import buckling_loads, elastica, elastica_load
 from contin import AlgebraicProblem, ProblemError, diagram, solve, trace
 
 

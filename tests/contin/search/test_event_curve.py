@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 import pytest
-from bank.gelfand import perturbed_gelfand
 
+from bank.gelfand import perturbed_gelfand
 from contin import (
     AlgebraicProblem,
     Event,

@@ -5,10 +5,10 @@ import pickle
 
 import numpy as np
 import pytest
-from bank import abc
-from bank.ab import problem as reactor
 
 import contin
+from bank import abc
+from bank.ab import problem as reactor
 from contin import AlgebraicProblem, ProblemError
 
 

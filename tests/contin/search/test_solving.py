@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from bank.closed_forms import bratu, bratu_middles
 
+from bank.closed_forms import bratu, bratu_middles
 from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, ProblemError, solve, trace
 
 

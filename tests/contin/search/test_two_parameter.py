@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+
 from bank import opt
 from bank.closed_forms import cusp, elastica
 from bank.gelfand import perturbed_gelfand
-
 from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, solve, trace
 
 

@@ -1,6 +1,6 @@
 """The bank in other units: every state, parameter, functional and equation multiplied by a random power of ten.
 
-``python -m bank.units --help`` (from tests/contin) runs the whole bank at several seeds and prints the cases that then fail.
+``python -m bank.units --help`` runs the whole bank at several seeds and prints the cases that then fail.
 A value X of the original problem is s X in the restated one. The factors s are further parameters, so that the restated
 functions are compiled once for all seeds. Guesses, limits, zeros and the wanted values are restated alike.
 """
@@ -17,10 +17,10 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from bank import case as cases
-from bank.case import TOLERANCE, Case
 
 import contin
+from bank import case as cases
+from bank.case import TOLERANCE, Case
 
 NAMES = (
     "exp", "int", "bvp", "lin", "non", "ezp", "ext", "spb", "kar", "bru", "pd2",

@@ -1,4 +1,4 @@
-"""Reference values without a closed form, in extended precision: ``python -m bank.refine`` (from tests/contin, 15 s).
+"""Reference values without a closed form, in extended precision: ``python -m bank.refine`` (15 s).
 
 Equations and null vectors are stated here once more; points of the engine serve as first guesses only. Every value is computed
 on the mesh of the guess with two and with four times as many intervals, must agree between them, and is looked up in the bank.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from bank import bru, ext, kar, non, pd2, spb
 from bank.longdouble import LD, Problem
 from bank.references import confirm

@@ -1,4 +1,4 @@
-"""The whole bank under other settings: ``python -m bank.stress`` (from tests/contin, ten minutes). Prints what then differs.
+"""The whole bank under other settings: ``python -m bank.stress`` (ten minutes). Prints what then differs.
 
 Special points are properties of the problem: no step, angle or degree within reason may lose or invent one. A run that ends for
 want of points is no error.
@@ -10,10 +10,9 @@ import importlib
 import sys
 import time
 
+import contin
 from bank import case as cases
 from bank.table import BANK, OUTSIDE
-
-import contin
 
 VARIANTS = (
     {"step": 0.01}, {"step": 0.5}, {"step": 2.0}, {"angle": 0.15}, {"angle": 0.7}, {"accuracy": 0.1}, {"accuracy": 0.005},

@@ -8,7 +8,6 @@ Values by collocation of degree 8 in extended precision (``bank.longdouble``); m
 import functools
 
 from bank.case import Case, Special
-
 from contin import BoundaryValueProblem, solve, trace
 
 

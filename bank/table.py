@@ -1,4 +1,4 @@
-"""A table of how the problems from outside come out: ``python -m bank.table`` (from tests/contin, a minute).
+"""A table of how the problems from outside come out: ``python -m bank.table`` (a minute).
 
 ``--all`` adds those of the other modules of the bank. For each run: how many special points there are (its end and the values
 asked for included), how many were found, missed and invented; the largest error relative to max(1, |value|); and the largest
@@ -12,7 +12,6 @@ import importlib
 import sys
 
 from bank.case import Case, deviations, estimates, labelled
-
 from contin import ContinError
 
 OUTSIDE = "equilibria", "statics", "rods", "fields"

@@ -8,7 +8,6 @@ the map.)
 import functools
 
 from bank.case import Case, Special
-
 from contin import AlgebraicProblem, solve, trace
 
 LIMITS = {"p1": (-5, 5), "X": (-9, 9), "Y": (-20, 20)}

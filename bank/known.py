@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from bank.case import Special
 from scipy.optimize import brentq
+
+from bank.case import Special
 
 #: The zeros of an interval are looked for between so many places.
 GRID = 401

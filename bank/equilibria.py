@@ -7,9 +7,9 @@ function on it (``bank.known``). Published values, where there are some, stand b
 import functools
 
 import numpy as np
+
 from bank.case import Case, Special
 from bank.known import ERROR, equilibria, zeros
-
 from contin import AlgebraicProblem, solve, trace
 
 

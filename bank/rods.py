@@ -7,10 +7,10 @@ import functools
 import math
 
 import numpy as np
-from bank.case import Case, Special
-from bank.known import ERROR, zeros
 from scipy.special import ellipk, j0, jv
 
+from bank.case import Case, Special
+from bank.known import ERROR, zeros
 from contin import BoundaryValueProblem, solve, trace
 
 

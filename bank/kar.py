@@ -10,7 +10,6 @@ import functools
 import math
 
 from bank.case import Case, Special, run_until
-
 from contin import BoundaryValueProblem, MeshControl, solve
 
 

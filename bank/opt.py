@@ -9,8 +9,8 @@ import functools
 import math
 
 import numpy as np
-from bank.case import Case, Special
 
+from bank.case import Case, Special
 from contin import AlgebraicProblem, curve, solve, trace
 
 

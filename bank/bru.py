@@ -12,7 +12,6 @@ import functools
 import math
 
 from bank.case import Case, Special
-
 from contin import BoundaryValueProblem, solve, trace
 
 

@@ -1,4 +1,4 @@
-"""Values of radial problems by shooting: ``python -m bank.shooting`` (from tests/contin, half a minute) prints them.
+"""Values of radial problems by shooting: ``python -m bank.shooting`` (half a minute) prints them.
 
 v'' + k v' / x = -f(v) with v(0) = top and v'(0) = 0 reaches its boundary value at x = X(top), so lam = X^2 on the unit
 interval. Folds are where dv/dtop vanishes as well. Integrated by scipy's DOP853 with tolerances of 1e-13 together with the
@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from bank.known import slope, zeros
 from scipy.integrate import solve_ivp
+
+from bank.known import slope, zeros
 
 #: From the centre to here, divided by the root of f and its slope, the first terms of the power series do: the next one is of
 #: the order of the sixth power.

@@ -7,7 +7,6 @@ unequal cells leaves, a closed one with four folds. Values by mpmath with 30 dig
 import functools
 
 from bank.case import Case, Special
-
 from contin import AlgebraicProblem, solve, trace
 
 

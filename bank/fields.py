@@ -6,10 +6,10 @@ Closed forms by scipy's elliptic and Mathieu functions; radial problems by shoot
 import functools
 import math
 
-from bank.case import Case, Special
-from bank.known import ERROR, zeros
 from scipy.special import ellipe, ellipj, ellipk, mathieu_a
 
+from bank.case import Case, Special
+from bank.known import ERROR, zeros
 from contin import BoundaryValueProblem, solve, trace
 
 #: What values of ``bank.shooting`` are good to (the strip has a closed form, which agrees).

@@ -1,4 +1,4 @@
-"""The reference values once more, from closed forms and quadratures: ``python -m bank.references`` (from tests/contin, 40 s).
+"""The reference values once more, from closed forms and quadratures: ``python -m bank.references`` (40 s).
 
 Everything is computed by mpmath with 30 digits, from scratch, and looked up among the special points of the bank: a value that
 is not there to 2e-15 (relative to max(1, |value|)) is an error. Values of problems without such a form: ``bank.refine``.

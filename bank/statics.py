@@ -3,9 +3,9 @@
 import functools
 
 import numpy as np
+
 from bank.case import Case, Special
 from bank.known import ERROR, equilibria, zeros
-
 from contin import AlgebraicProblem, curve, solve, trace
 
 # --- the two-bar truss (von Mises 1923), height 3, half span 1, both displacements of the apex -------------------------

@@ -9,7 +9,6 @@ import functools
 import math
 
 from bank.case import Case, Special
-
 from contin import AlgebraicProblem, solve, trace
 
 

@@ -10,7 +10,6 @@ import functools
 import math
 
 from bank.case import Case, Special
-
 from contin import BoundaryValueProblem, curve, solve, trace
 
 

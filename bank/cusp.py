@@ -7,7 +7,6 @@ import functools
 import math
 
 from bank.case import Case, Special
-
 from contin import AlgebraicProblem, curve, solve, trace
 
 
