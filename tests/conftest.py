@@ -19,18 +19,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 ROOT = Path(__file__).parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]  # for `printed`, and for the bank of reference problems
-#: The modules that take longest, some six seconds or more, in order. They are handed out first: what comes last must be short,
+#: The modules that take longest, some two seconds or more, in order. They are handed out first: what comes last must be short,
 #: or one worker ends long before the other.
 FIRST = (
-    "branches/test_network", "branches/test_explore", "branches/test_scene", "contin/search/test_further",
-    "ribbon_model/test_network", "branches/test_pictures", "branches/test_further_closed", "branches/test_at_value",
-    "branches/test_diagram", "branches/test_run", "contin/boundary/test_oscillating", "ribbon_model/test_network_random",
-    "test_docs", "branches/test_further", "ribbon_model/test_network_segments", "branches/test_open",
-    "contin/equilibria/test_solver", "contin/boundary/test_fields", "branches/test_interrupt", "ribbon_model/test_exact",
-    "contin/events/test_random_equilibria", "ribbon_model/test_network_index", "contin/functions/test_cache",
-    "branches/test_solid", "contin/search/test_many", "branches/test_sentences", "contin/collocation/test_switches",
-    "ribbon_model/test_network_loop", "contin/continuation/test_bank", "contin/continuation/test_sizes",
-    "ribbon_model/test_examples", "branches/test_cli", "ribbon_model/test_phases", "test_torture",
+    "branches/test_network", "branches/test_explore", "contin/continuation/test_bank", "branches/test_diagram",
+    "ribbon_model/test_examples", "contin/test_examples", "branches/test_run", "contin/boundary/test_fields",
+    "branches/test_scene", "branches/test_pictures", "ribbon_model/test_network", "branches/test_hostile_config",
+    "branches/test_open", "ribbon_model/test_branches", "test_scenes", "test_stress",
 )  # fmt: skip
 #: Each worker imports everything and needs up to a gigabyte.
 MOST_WORKERS = 8
