@@ -7,26 +7,13 @@ from branches.scene.stage import Stage
 
 
 def stages_of(scene: Scene) -> list[Stage]:
-    """Return the stages of a scene, in order."""
-    return _KINDS[scene.KIND](scene)
+    """Return the stages of a scene, in order; each kind of strip needs mechanics that the others do not."""
+    if scene.KIND == "closed strip":
+        from branches.scene.closed_stage import ClosedStage
 
-
-def _closed(scene: Scene) -> list[Stage]:
-    from branches.scene.closed_stage import ClosedStage  # each kind of strip needs mechanics that the other does not
-
-    return [ClosedStage(scene)]
-
-
-def _open(scene: Scene) -> list[Stage]:
-    from branches.scene.open_stage import OpenStage
-
-    return [OpenStage(scene, number) for number in range(1, scene.stage_count + 1)]
-
-
-def _network(scene: Scene) -> list[Stage]:
-    from branches.scene.network_stage import NetworkStage
-
-    return [NetworkStage(scene, number) for number in range(1, scene.stage_count + 1)]
-
-
-_KINDS = {"closed strip": _closed, "open strip": _open, "network": _network}
+        return [ClosedStage(scene)]
+    if scene.KIND == "open strip":
+        from branches.scene.open_stage import OpenStage as Kind
+    else:
+        from branches.scene.network_stage import NetworkStage as Kind
+    return [Kind(scene, number) for number in range(1, scene.stage_count + 1)]
