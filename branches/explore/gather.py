@@ -6,7 +6,7 @@ import math
 from functools import partial
 from pathlib import Path
 
-from branches.explore import profiles, staged, strips
+from branches.explore import profiles, strips
 from branches.graph.stored import DIAGRAM, read_any
 from branches.run.executor import executor, run_jobs
 from branches.run.progress import Progress
@@ -67,7 +67,7 @@ def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict
     """Return the data of a page of strips, of the kind of the first one."""
     if read_branch(files[0]).scene.KIND == CLOSED:
         return _of_closed_strips(files, titles, progress)
-    return staged.gathered(files, next(filter(None, titles), ""), slow=len(files) <= _SLOW)
+    return strips.stages_gathered(files, next(filter(None, titles), ""), slow=len(files) <= _SLOW)
 
 
 def _of_closed_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
