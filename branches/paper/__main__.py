@@ -40,7 +40,7 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
     "fig10": _later("branches.paper.circles", "fig10"),
     "fig11": _later("branches.paper.diagram", "fig11"),
     "fig12": _later("branches.paper.diagram", "fig12"),
-    "fig12b": _later("branches.paper.stability", "fig12b"),
+    "fig12b": _later("branches.paper.diagram", "fig12b"),
     "curves": _later("branches.paper.curves", "curves"),
     "snaps": _later("branches.paper.snaps", "snaps"),
     "finite-width": _later("branches.paper.finite_width", "finite_width"),

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.draw.style import in_words
-from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, keep
-from branches.paper.page import Row, Section
+from branches.paper.page import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, Row, Section, keep
 from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.linear import convex_limits, energy_interval, stability_interval

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from branches.draw.style import colour_of
-from branches.paper.draw import STABLE, keep
-from branches.paper.page import Row, Section
+from branches.paper.page import STABLE, Row, Section, keep
 from branches.scene.index import LABEL, SymmetryWatch
 from contin import Settings, curve, trace
 from contin.lowlevel import Label, locate_branch_point, point_of

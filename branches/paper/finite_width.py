@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 from branches.draw.style import CONJUGATE, NATURAL, colour_of
 from branches.graph.picture import conjugate, legend
 from branches.graph.stored import read
-from branches.paper.draw import keep
-from branches.paper.page import Row, Section
+from branches.paper.page import Row, Section, keep
 from branches.run.display import Display
 from branches.run.many import run_many
 from branches.scene.parse import parse

@@ -1,4 +1,4 @@
-"""One page out of the sections that `branches.paper` computes: Markdown and plain HTML, no external resources."""
+"""One page, in Markdown and plain HTML without external resources, and what its pictures share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from branches.store import interrupt
-from branches.store.files import StoreError, write_bytes
+from branches.store.files import StoreError, write_bytes, write_picture
+from contin.lowlevel import Colour
+
+#: Colours of all pictures; they survive colour blindness and a grey printer.
+STABLE, UNSTABLE, MODES, RIGID = Colour.BLUE, Colour.VERMILION, "#8a6d3b", Colour.BLACK
+UNSTABLE_FILL = "#F3B48B"
+#: Stable states that are buckled, beside stable circles.
+BUCKLED = Colour.SKY
 
 
 @dataclass(frozen=True)
@@ -149,3 +156,10 @@ def page(sections: list[Section]) -> str:
             body += ["<ul>", *(f"<li>{text(note)}</li>" for note in section.notes), "</ul>"]
     head = f'<meta charset="utf-8"><title>{text(TITLE)}</title><style>{STYLE}</style>'
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
+
+
+def keep(figure, folder: Path, name: str) -> str:
+    """Write a figure of no display as name.png and name.svg; the name. Raises `branches.store.files.StoreError`."""
+    for suffix in (".png", ".svg"):
+        write_picture(figure, folder / f"{name}{suffix}")
+    return name

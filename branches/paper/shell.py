@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.draw import STABLE, UNSTABLE, keep
-from branches.paper.page import Row, Section
+from branches.paper.page import STABLE, UNSTABLE, Row, Section, keep
 from branches.paper.shell_run import DEFAULT, Outcome, ShellError, compute, describe, read
 from branches.store.command import write_output
 from contin.lowlevel import Colour

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from branches.paper.draw import keep
-from branches.paper.page import Row, Section
+from branches.paper.page import Row, Section, keep
 from ribbon_model.descent import KICK, METRICS, PAST, SEGMENTS, Rest, let_go, past
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.linear import energy_interval

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.draw import STABLE, UNSTABLE_FILL, keep
-from branches.paper.page import Row, Section
+from branches.paper.page import STABLE, UNSTABLE_FILL, Row, Section, keep
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import HINGED, factors, first_root
 
