@@ -1,4 +1,4 @@
-"""Several strips in space with their joints and supports: blocks where nothing turns, pins of hinges, balls."""
+"""Strips in space as they stand in pictures and files, with their joints and supports: blocks, pins of hinges, balls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from branches.draw.solid import Mesh, solid, surface, together
 from contin.lowlevel import shown
-from ribbon_model.ends import Vector, perpendicular
+from ribbon_model.ends import DIRECTIONS, Vector, perpendicular
 from ribbon_model.shape import Shape
 
 #: Forms of joints, and of dead forces.
@@ -23,6 +23,8 @@ _FORMS: dict[str, tuple[int, list[tuple[float, float]]]] = {
 }
 #: Supports are larger than joints by this factor, so that a joint at a support is seen.
 _SUPPORT = 1.5
+#: A direction with a larger component along the tangent is that of a strip that stands upright.
+_UPRIGHT = 0.99
 
 
 @dataclass(frozen=True)
@@ -145,3 +147,29 @@ def fixtures_of(shape: Shape | Structure) -> tuple[Fixture, ...]:
 def solids_of(shape: Shape | Structure, width: float) -> list[tuple[Fixture, Mesh]]:
     """Return the joints, supports and forces of a structure with their solids; a strip alone has none."""
     return shape.solids(width) if isinstance(shape, Structure) else []
+
+
+def flat_across(shape, law):
+    """The shape with its sections straight along d1 if the law has no generators."""
+    return shape if law.has_rulings else replace(shape, eta=np.zeros_like(shape.eta))
+
+
+def standing(shape: Shape | Structure, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape | Structure:
+    """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
+    z = np.array(up)
+    ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
+    x = np.array(ahead) - z * (z @ ahead)
+    x /= np.linalg.norm(x)
+    return moved(shape, np.array([x, np.cross(z, x), z]), np.zeros(3))
+
+
+def moved(shape, axes: np.ndarray, by: np.ndarray, scale: float = 1.0):
+    """Return a shape, or a structure, on new axes (rows), moved there, and then scaled."""
+    if isinstance(shape, Structure):
+        there = []
+        for one in shape.fixtures:
+            axis = tuple(axes @ one.axis) if one.in_space else one.axis
+            there.append(replace(one, arm=tuple(scale * x for x in one.arm), axis=axis))
+        return replace(shape, parts=tuple(moved(part, axes, by, scale) for part in shape.parts), fixtures=tuple(there))
+    x = (shape.centreline @ axes.T + by) * scale
+    return replace(shape, arclength=shape.arclength * scale, centreline=x, directors=shape.directors @ axes.T)

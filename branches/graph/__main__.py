@@ -19,7 +19,7 @@ from branches.store.files import StoreError
 
 
 def read(path: str | Path):
-    """Return the diagram in a folder (or in a ``diagram.json``); for a scene, its preview (`branches.graph.preview`).
+    """Return the diagram in a folder (or in a ``diagram.json``); for a scene, its preview (`branches.graph.closed`).
 
     Raises
     ------
@@ -28,8 +28,8 @@ def read(path: str | Path):
     """
     if Path(path).suffix not in (".yaml", ".yml"):
         return read_any(path)
+    from branches.graph.closed import preview  # scenes and quadratures take 0.3 s: not for questions about results
     from branches.graph.kinds import graph_kind
-    from branches.graph.preview import preview  # scenes and quadratures take 0.3 s: not for questions about results
     from branches.scene.fields import ConfigError
     from branches.scene.parse import load
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from branches.draw.picture import figure as draw_branch
 from branches.graph import closed as diagram
+from branches.graph.closed import preview
 from branches.graph.picture import figure as draw_diagram
-from branches.graph.preview import preview
 from branches.graph.stored import read
 from branches.paper.page import BUCKLED, STABLE, Row, Section, keep
 from branches.run.display import Display

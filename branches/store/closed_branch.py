@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from branches.draw.shapes import flat_across
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, WIDTH, steady
+from branches.draw.structure import flat_across
 from branches.draw.style import NU, colour_of, in_words
 from branches.scene.closed import and_nu
 from branches.scene.labels import kind_of, label_of

@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from branches.draw.shapes import flat_across
 from branches.draw.strip import View
-from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure
+from branches.draw.structure import ARROW, BALL, BLOCK, PIN, Fixture, Structure, flat_across
 from branches.store.open_branch import OpenBranch
 from contin.lowlevel import levels
 from ribbon_model.ends import CLAMPED, HINGED, unit

@@ -8,10 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from branches.draw.shapes import flat_across, moved, standing
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, SIDE, View
-from branches.draw.structure import parts_of
+from branches.draw.structure import flat_across, moved, parts_of, standing
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError

@@ -13,7 +13,7 @@ import branches
 from branches.graph import __main__ as graph
 from branches.graph import at_value
 from branches.graph.at_value import EXACT, INTERPOLATED, SOLVED, holding, states_at
-from branches.graph.preview import preview
+from branches.graph.closed import preview
 from branches.graph.stored import read
 from branches.run.display import Display
 from branches.run.many import run_many

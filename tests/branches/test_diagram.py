@@ -25,9 +25,9 @@ from branches.export.__main__ import main as export_command
 from branches.graph import closed as diagram
 from branches.graph import picture as draw_diagram
 from branches.graph.__main__ import main as graph_command
+from branches.graph.closed import preview
 from branches.graph.interpolation import places
 from branches.graph.parts import Part
-from branches.graph.preview import preview
 from branches.graph.stored import read
 from branches.read import read_branch
 from branches.run import executor as executors

@@ -22,8 +22,8 @@ COMMANDS = {
     "strip": (STRIP, "this command writes no files", "ribbon_model.seeds"),
     "explore": (["primary.h5", "--out", "page.html"], "no page was written", "branches.explore.gather"),
     "shell": (["--out", "shell.h5"], "finished cases are kept", "branches.paper.shell_run"),
-    "graph": (["many.yaml"], "this command writes no files", "branches.graph.preview"),
-    "plot": (["many.yaml", "--out", "picture.pdf"], "no picture was written", "branches.graph.preview"),
+    "graph": (["many.yaml"], "this command writes no files", "branches.graph.closed"),
+    "plot": (["many.yaml", "--out", "picture.pdf"], "no picture was written", "branches.graph.closed"),
 }
 
 

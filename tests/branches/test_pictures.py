@@ -21,9 +21,9 @@ from branches.draw.style import colour_of
 from branches.export import __main__ as export
 from branches.export.film import drawn as frames
 from branches.export.film import evenly
+from branches.graph.closed import preview
 from branches.graph.picture import WINDOW, circles, conjugate, heights, legend, lines
 from branches.graph.picture import figure as diagram_figure
-from branches.graph.preview import preview
 from branches.paper.diagram import FIG12
 from branches.read import read_branch
 from branches.run.display import Display
