@@ -20,7 +20,7 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.stored import DIAGRAM, new_graph, read, save
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.run.runner import compute_scene
 from branches.scene.closed import ClosedScene
 from branches.scene.fields import ConfigError

@@ -70,7 +70,7 @@ def undisturbed(name: str, folder: Path) -> Scene:
 
 def load_kernels(names: list[str]) -> None:
     """Compile or load the functions of the scenes, once before processes are forked."""
-    from branches.run.progress import (
+    from branches.run.display import (
         StartingDisplay,  # runs without rights cannot load modules that are not there when they fork
     )
     from branches.run.runner import compute_scene

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from branches.explore import profiles, strips
 from branches.graph.stored import DIAGRAM, read_any
+from branches.run.display import Progress
 from branches.run.executor import executor, run_jobs
-from branches.run.progress import Progress
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED
 from branches.store.read import read_branch

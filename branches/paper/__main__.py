@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.store.command import Parser, complain, survive_any_encoding, write_output
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib

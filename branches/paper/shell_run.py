@@ -22,8 +22,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from branches.run.display import Progress
 from branches.run.executor import cores, run_jobs
-from branches.run.progress import Progress
 from branches.store import interrupt
 from branches.store.command import Parser, complain, survive_any_encoding, write_output
 from branches.store.files import StoreError, check_hdf5_name, only_run, prepare, write_bytes

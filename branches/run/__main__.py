@@ -91,7 +91,7 @@ def _run(options) -> int:
         path = output_path(options)
     except (ConfigError, StoreError) as error:
         return _refuse(error)
-    from branches.run.progress import StartingDisplay
+    from branches.run.display import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.run.runner import run_scene
@@ -170,7 +170,7 @@ def _run_many(sweep, options) -> int:
         )
     folder = Path(options.out or Path(options.config).stem)
     check_folder_name(folder)
-    from branches.run.progress import StartingDisplay
+    from branches.run.display import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.run.executor import ExecutorError

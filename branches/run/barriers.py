@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.scene.labels import begins
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point

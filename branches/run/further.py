@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from branches.run.barriers import State, chosen_rows, states_at
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, MeshControl, Search, Settings
 from contin.lowlevel import Searched, exact_text, further, levels

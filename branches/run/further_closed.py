@@ -11,7 +11,7 @@ import numpy as np
 from branches.graph import closed
 from branches.graph.at_value import states_at
 from branches.graph.stored import new_graph, read_any
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.scene.closed import law_of
 from branches.store.read import read_branch
 from contin import Point

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from contin import Settings, trace
 from contin.lowlevel import Label, levels, point_of
 from ribbon_model import law_end, linear, stability

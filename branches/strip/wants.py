@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from branches.run.progress import Progress
+from branches.run.display import Progress
 from branches.store.files import write_picture
 from branches.strip.states import at_natural_curvatures, circle_name
 from contin.lowlevel import Colour

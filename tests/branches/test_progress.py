@@ -13,10 +13,9 @@ from branches.graph.closed import _circle
 from branches.graph.kinds import graph_kind
 from branches.graph.stored import new_graph
 from branches.paper import shell_run as shell
-from branches.run.display import Display
+from branches.run.display import Display, Progress, StartingDisplay
 from branches.run.executor import WAIT
 from branches.run.many import _Plan
-from branches.run.progress import Progress, StartingDisplay
 from branches.scene.parse import parse
 from contin.lowlevel import exact_text
 

@@ -16,9 +16,8 @@ from branches.graph.kinds import graph_kind
 from branches.graph.parts import add
 from branches.graph.picture import circles
 from branches.graph.stored import new_graph, read, save
-from branches.run.display import Display
+from branches.run.display import Display, Progress
 from branches.run.many import run_many
-from branches.run.progress import Progress
 from branches.run.runner import run_scene
 from branches.scene.closed_stage import ClosedStage
 from branches.scene.columns import FOUND, Column, error_of
