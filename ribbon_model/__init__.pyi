@@ -2,8 +2,7 @@
 from . import exact, linear, network
 from .descent import descend
 from .domains import CELL, HALF_LOOP
-from .ends import End
-from .integral_conditions import Roller
+from .ends import End, Roller
 from .law import Law, Parameter
 from .laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, RIBBON, ROD
 from .open_strip import OpenStrip

@@ -21,11 +21,10 @@ import numpy as np
 
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
 from contin.lowlevel import Collocation, Continuation, Undetermined, shown
-from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
-from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
+from ribbon_model import ends, first_guesses, law_end, loads, natural_state
+from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PHASES, PLACE, End, Roller
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.first_guesses import Guess
-from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.section import Section
 from ribbon_model.shape import Shape, shape_of
@@ -167,7 +166,7 @@ class OpenStrip:
         return len(self.phases) + (self.roller is not None)
 
     def _hamiltonian(self) -> Callable:
-        complementary, inside = self.section.hamiltonian(), integral_conditions.densities(self.phases, self.roller)
+        complementary, inside = self.section.hamiltonian(), ends.densities(self.phases, self.roller)
         potential = loads.distributed(
             self.weight_direction if "weight" in self.numbers else None,
             self.foundation_direction if "foundation" in self.numbers else None,

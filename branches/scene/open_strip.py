@@ -423,7 +423,7 @@ class OpenScene(StagedScene):
 
     def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
         """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
-        from ribbon_model.integral_conditions import Roller
+        from ribbon_model.ends import Roller
         from ribbon_model.loads import LOADS, STROKE, replacing_loads
         from ribbon_model.open_strip import OpenStrip
 

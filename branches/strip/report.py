@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from branches.scene.units import STRIP_UNITS, unusual
 from branches.strip.states import State, buckled, by_hand, circles, ways_out
-from ribbon_model.barriers import Barrier
-from ribbon_model.folding import Folding
+from ribbon_model.barriers import Barrier, Folding
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.linear import energy_interval, thresholds
 from ribbon_model.strip import Strip

@@ -12,9 +12,8 @@ from branches.run.display import Progress
 from contin import Settings, trace
 from contin.lowlevel import Label, levels, point_of
 from ribbon_model import law_end, linear, stability
-from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
+from ribbon_model.barriers import Barrier, Folding, barriers, covering_index, folding, is_at, sides
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.folding import Folding, folding
 from ribbon_model.laws import FINITE_WIDTH, NoThreshold, TwoBendings
 from ribbon_model.second_variation import Equilibrium
 from ribbon_model.seeds import primary_branch

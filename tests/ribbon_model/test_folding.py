@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from ribbon_model.barriers import folding
 from ribbon_model.exact_finite_width import curve
-from ribbon_model.folding import folding
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD
 
 KAPPA, NU, GAMMA = 3.3, 0.3, 0.1

@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import contin
-from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, hinge
-from ribbon_model.integral_conditions import Roller
+from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, Roller, hinge
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.section import section_of
 
