@@ -14,16 +14,15 @@ from .events.error import error
 from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
-from .functions.gradient import gradient
-from .functions.iteration import least, minimum, root
+from .functions.iteration import gradient, least, minimum, root
 from .functions.machine_code import cache_directory
 from .linalg.orientation import eigenbasis
-from .results.columns import StoredColumns, read_columns
-from .results.curve import hermite, through
 from .results.marks import PALETTE, Colour
 from .results.phase_response import PhaseResponse
+from .results.plot import hermite, through
 from .results.point import point_of
 from .results.spectrum import Spectrum
+from .results.storage import StoredColumns, read_columns
 from .search.further import Searched, further
 from .search.trace import follow, oscillation
 from .text import exact_text, shown

@@ -12,7 +12,6 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.step import Stop
-from contin.results import curve as curves
 from contin.results import plot, table
 from contin.results.marks import Axes
 from contin.results.point import Point
@@ -156,7 +155,7 @@ class Branch:
         """
         for name in names:
             plot.check_column(self.points, "names", name)
-        return curves.curve(self.points, names)
+        return plot.curve(self.points, names)
 
     @checks.arguments
     def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:

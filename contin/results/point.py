@@ -19,8 +19,7 @@ from contin.errors import ProblemError
 from contin.events.error import error
 from contin.events.phase_loads import phase_loads
 from contin.problems.statement import PERIOD
-from contin.results import notebook
-from contin.results.marks import Axes
+from contin.results.marks import Axes, point_to_html
 from contin.results.record import Profile, Record
 from contin.results.sensitivity import sensitivities
 from contin.text import COLUMNS
@@ -127,7 +126,7 @@ class Point(Record):
         return f"Point({' '.join(filter(None, (self.label, self.name)))}{': ' * bool(self.label)}{values}{more})"
 
     def _repr_html_(self) -> str:
-        return notebook.point_to_html(self)
+        return point_to_html(self)
 
     @property
     def normal_form(self) -> float | None:

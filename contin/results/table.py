@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from contin.results.curve import column
-from contin.results.notebook import html_table
-from contin.results.plot import picture, plot
+from contin.results.marks import html_table
+from contin.results.plot import column, picture, plot
 from contin.results.point import Point
 
 
