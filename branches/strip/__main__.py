@@ -75,17 +75,17 @@ def _answer(strip: Strip, asked: dict) -> int:
     """Write what is asked for; return the exit code."""
     from threadpoolctl import threadpool_limits
 
-    from branches.strip import report, wants  # .5 s: not for a mistake in the dimensions
+    from branches.strip import report  # .5 s: not for a mistake in the dimensions
 
     turns, quiet = asked["turns"] or 3, asked["quiet"]
     with threadpool_limits(1, "blas"):  # the matrices are small
         if asked["want"] is None and asked["chart"] is None:
             write_output(report.answer(strip, asked["yield_strain"], quiet))
         if asked["want"] is not None:
-            write_output(wants.answer(strip, turns, asked["want"], quiet))
+            write_output(report.dimensions(strip, turns, asked["want"], quiet))
         if asked["chart"] is not None:
             try:
-                wants.chart(strip, turns, Path(asked["chart"]), quiet)
+                report.chart(strip, turns, Path(asked["chart"]), quiet)
             except StoreError as error:
                 complain(f"error: {error}")
                 return 2

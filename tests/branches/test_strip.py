@@ -17,9 +17,8 @@ from branches.scene.units import quantity
 from branches.strip import report as strip_report
 from branches.strip import states as strip_states
 from branches.strip.__main__ import main
-from branches.strip.report import assumptions, deviations
+from branches.strip.report import assumptions, barrier, barriers_at, chart, deviations, dimensions
 from branches.strip.states import buckled, circles, ways_out
-from branches.strip.wants import answer, barrier, barriers_at, chart
 from ribbon_model.exact_finite_width import curve
 from ribbon_model.laws import FINITE_WIDTH, RIBBON, TwoBendings
 from ribbon_model.linear import energy_interval, thresholds
@@ -194,19 +193,19 @@ def test_a_barrier_vanishes_where_stability_ends():
 
 @pytest.mark.full
 def test_dimensions_for_a_barrier():
-    printed = answer(BLADE, 3, 0.3)
+    printed = dimensions(BLADE, 3, 0.3)
     radii, widths, thicknesses = (re.findall(r"([\d.]+) mm", line) for line in printed.splitlines()[1:])
     assert (len(radii), len(widths), len(thicknesses)) == (2, 1, 1)
     for name, found in (("natural_radius", radii), ("width", widths), ("thickness", thicknesses)):
         for value in found:
             assert barrier(replace(BLADE, **{name: float(value) / 1e3}), 3) == pytest.approx(0.3, rel=1e-2)  # 4 digits printed
-    assert "none between 28.6 and 715 mm" in answer(BLADE, 3, 5.0)
+    assert "none between 28.6 and 715 mm" in dimensions(BLADE, 3, 5.0)
 
 
 @pytest.mark.full
 def test_a_chart_is_drawn(tmp_path, monkeypatch, capsys):
     few = {"Gammas": np.array([0.1, 1.0]), "parts": np.linspace(0.1, 0.9, 3)}
-    monkeypatch.setattr("branches.strip.wants.chart", partial(chart, **few))
+    monkeypatch.setattr("branches.strip.report.chart", partial(chart, **few))
     assert main([*OPTIONS, "--chart", str(tmp_path / "chart.png"), "--turns", "3"]) == 0
     assert capsys.readouterr().out == f"written to {tmp_path / 'chart.png'}\n"
     assert (tmp_path / "chart.png").stat().st_size > 10_000
