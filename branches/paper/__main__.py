@@ -43,7 +43,7 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
     "fig12b": _later("branches.paper.diagram", "fig12b"),
     "curves": _later("branches.paper.curves", "curves"),
     "snaps": _later("branches.paper.snaps", "snaps"),
-    "finite-width": _later("branches.paper.finite_width", "finite_width"),
+    "finite-width": _later("branches.paper.curves", "finite_width"),
     "fig7": _later("branches.paper.shell", "fig7"),  # last: minutes of CalculiX
 }
 
