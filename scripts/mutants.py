@@ -49,7 +49,7 @@ MUTANTS = {
                  "ribbon_model/test_changed_ends.py"),
     "B1": Mutant("resume keeps one solution too many", "branches/store/writer.py", 'index["point"] < points',
                  'index["point"] <= points', "branches/test_run.py"),
-    "B2": Mutant("Newton's part of errors of found numbers x 100", "branches/scene/errors.py", "left = point.newton_error",
+    "B2": Mutant("Newton's part of errors of found numbers x 100", "branches/scene/stage.py", "left = point.newton_error",
                  "left = 100 * point.newton_error", "branches/test_open_accuracy.py"),
     "B3": Mutant("upper end of --folds LOW HIGH less 1", "branches/graph/closed.py", '<= data["kappa_n"] <= high',
                  '<= data["kappa_n"] <= high - 1', "branches/test_diagram.py"),

@@ -12,7 +12,7 @@ import numpy as np
 
 from branches.graph import closed as diagram
 from branches.graph.interpolation import uncertainty
-from branches.scene.errors import errors_of
+from branches.scene.stage import errors_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.read import read_branch

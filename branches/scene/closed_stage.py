@@ -9,13 +9,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from branches.scene.advice import no_state
 from branches.scene.closed import ClosedScene
 from branches.scene.columns import FOUND, NUMBER, Column, Columns, error_of
-from branches.scene.errors import errors_of
 from branches.scene.fields import ConfigError, StepConfig
 from branches.scene.labels import PRIMARY, START, TRIVIAL, label_of
-from branches.scene.stage import Stage
+from branches.scene.stage import Stage, errors_of, no_state
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels
 from ribbon_model import law_end

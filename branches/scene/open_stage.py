@@ -9,13 +9,11 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from branches.scene.advice import no_state, reached
 from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns, error_of
-from branches.scene.errors import errors_of
 from branches.scene.fields import ConfigError
 from branches.scene.labels import CONJUGATE, label_of, without_round_off
 from branches.scene.open_strip import OpenScene, StagedScene
-from branches.scene.stage import Stage, Watch
+from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
 from ribbon_model.changed_ends import with_ends

@@ -13,10 +13,10 @@ import contin
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.runner import run_scene
-from branches.scene.errors import errors_of
 from branches.scene.fields import ConfigError
 from branches.scene.open_stage import first_state
 from branches.scene.parse import parse
+from branches.scene.stage import errors_of
 from ribbon_model.open_strip import REACTIONS
 
 DIMENSIONS = "{width: 0.01, thickness: 0.0005, length: 0.4, poisson_ratio: 0.3, youngs_modulus: 200.0e9}"

@@ -6,7 +6,7 @@ import contin
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.runner import run_scene
-from branches.scene import advice
+from branches.scene import stage as stages
 from branches.scene.fields import ConfigError
 from branches.scene.parse import parse
 
@@ -56,8 +56,8 @@ def test_a_corner_is_not_blamed_on_equations_that_a_scene_does_not_have(monkeypa
     problem = contin.AlgebraicProblem(lambda u, p: (u.x - abs(p.a),), ["x"], {"a": -1.0})
     run = contin.lowlevel.Continuation(*_free(problem), contin.Settings(limits={"a": (-1, 1)}))
     list(run)
-    monkeypatch.setattr(advice, "_goes_on", lambda *_: False)
-    stop = advice.no_state(run, "a = 0")
+    monkeypatch.setattr(stages, "_goes_on", lambda *_: False)
+    stop = stages.no_state(run, "a = 0")
     assert_scene_words(str(stop)) and "no state was found beyond a = 0: neither smaller steps nor" in str(stop)
 
 
@@ -73,7 +73,7 @@ def test_a_reason_of_another_kind_is_kept():
     run = contin.lowlevel.Continuation(*point.system.with_free(["a"], point.x), contin.Settings(max_points=5))
     list(run)
     run.stop = contin.lowlevel.Stop("no convergence", "h changed its sign, but no zero of it was found on the branch")
-    assert advice.no_state(run, "a = 1") is run.stop
+    assert stages.no_state(run, "a = 1") is run.stop
 
 
 @pytest.mark.full
