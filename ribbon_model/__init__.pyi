@@ -6,9 +6,8 @@ from .ends import End, Roller
 from .law import Law, Parameter
 from .laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, RIBBON, ROD
 from .open_strip import OpenStrip
-from .secondary import secondary_branch
 from .section import Section
-from .seeds import primary_branch
+from .seeds import primary_branch, secondary_branch
 from .solution import Solution
 from .strip import Strip
 

@@ -1,16 +1,29 @@
-"""The first point of a branch, from a linear mode of the circle."""
+"""The first point of a branch: a primary one from a linear mode of the circle, a secondary one where the index changes.
+
+`ribbon_model.modes` determines the symmetry of a secondary branch. A reversal that it keeps fixes two points half a loop apart,
+so the branch is computed on the half loop between mirrors or between axes, where its kernel is simple. Odd modes of j = 0 keep
+no reversal, and need the whole loop.
+
+Where R = 0 the equations are integrable and every wave has all symmetries of a primary branch. So the force distinguishes a
+secondary branch: for the laws with omega_2 = 0 it vanishes only where it meets a primary branch.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin.lowlevel import Collocation, levels, locate_branch_point
-from ribbon_model.domains import CELL, HALF_LOOP
+from ribbon_model.domains import CELL, HALF_LOOP, Domain
 from ribbon_model.law import Law, TwoBendings
 from ribbon_model.linear import circle, thresholds
 from ribbon_model.older import takes_parameters
+
+if TYPE_CHECKING:  # what a caller has it from
+    from ribbon_model.solution import Solution
 
 
 @takes_parameters
@@ -95,3 +108,34 @@ def leave_circle(system: Collocation, circle: np.ndarray):
     at = system.parameter_index("M2")
     tangent = max(found.tangents, key=lambda vector: abs(vector[at]))
     return system, found.x, tangent * np.sign(tangent[at])
+
+
+def force(point) -> float:
+    """Return |R| of a point (or similar object) of a branch: zero on a primary branch and on a circle."""
+    return math.hypot(*(point[name] for name in ("R1", "R2", "R3")))
+
+
+def secondary_branch(solution: Solution, domain: Domain):
+    """Return the point where a secondary branch leaves a primary one, near a solution on the cell, on a half loop.
+
+    Returns
+    -------
+    system : Collocation
+    x : ndarray, shape (system.size,)
+        The bifurcation of the discrete equations of the half loop.
+    tangent : ndarray, shape (system.size,)
+        Along the branch that leaves.
+
+    Raises
+    ------
+    ConvergenceError, ValueError
+        No branch that keeps this reversal leaves nearby.
+    """
+    system, x = solution.on(domain).discretized()
+    found = locate_branch_point(system, x)
+    at, kappa_n = system.parameter_index("kappa_n"), solution.parameters["kappa_n"]
+    near = abs(found.x[at] - kappa_n) < levels.ROUGH * (1 + abs(kappa_n))
+    if not (near and found.tangents):
+        raise ValueError(f"nothing leaves the half loop with the {domain.reversal} at kappa_n = {kappa_n:.6g}")
+    forces = [system.parameter_index(name) for name in system.free if name.startswith("R")]
+    return system, found.x, max(found.tangents, key=lambda vector: np.abs(vector[forces]).max())

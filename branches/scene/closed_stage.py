@@ -21,8 +21,7 @@ from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.law_end import NEARLY_ENDED
 from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.linear import covering, thresholds
-from ribbon_model.secondary import force, secondary_branch
-from ribbon_model.seeds import half_loop_branch, primary_branch
+from ribbon_model.seeds import force, half_loop_branch, primary_branch, secondary_branch
 
 #: The first points of primary branches, by domain.
 _SEEDS = {CELL.name: primary_branch, HALF_LOOP.name: half_loop_branch}

@@ -12,7 +12,7 @@ from contin.lowlevel import Label, correct, levels
 from ribbon_model.law_end import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode
-from ribbon_model.secondary import force
+from ribbon_model.seeds import force
 from ribbon_model.solution import Solution
 from ribbon_model.stability import Stability
 

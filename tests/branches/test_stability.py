@@ -13,8 +13,7 @@ from contin import Settings, trace
 from contin.lowlevel import locate_branch_point, point_of
 from ribbon_model.domains import HALF_LOOPS
 from ribbon_model.laws import RIBBON
-from ribbon_model.secondary import secondary_branch
-from ribbon_model.seeds import primary_branch
+from ribbon_model.seeds import primary_branch, secondary_branch
 from ribbon_model.solution import Solution
 
 SCENE = "{m: 3, n: 1, stability: true, limits: {kappa_n: [-30, 0]}, stride: 50}"

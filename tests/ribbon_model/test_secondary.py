@@ -14,8 +14,7 @@ from ribbon_model.equilibrium import directors, on_directors
 from ribbon_model.laws import FLAT_ROD, RIBBON
 from ribbon_model.modes import Mode
 from ribbon_model.second_variation import Symmetry
-from ribbon_model.secondary import force, secondary_branch
-from ribbon_model.seeds import primary_branch
+from ribbon_model.seeds import force, primary_branch, secondary_branch
 from ribbon_model.solution import Solution
 from ribbon_model.stability import index
 
