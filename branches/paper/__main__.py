@@ -94,14 +94,12 @@ def _compute(folder: Path, names: list[str], quiet: bool) -> None:
 
     sections = read(folder)
     with Progress("items", len(names), quiet) as progress:
-        for name in names:
+        for name in progress.each(names, str):
             began = time.monotonic()
-            progress.part(name)
             sections[name] = ITEMS[name](folder)
             # after each item: an interrupted call leaves a page of the finished items
             write(folder, {one: sections[one] for one in ITEMS if one in sections})
             progress.tell(f"{name}: {sections[name].title} ({time.monotonic() - began:.1f} s)\n")
-            progress.part_done()
     write_output(f"written to {folder / 'index.html'}\n")
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,8 +50,12 @@ class State:
 
 @dataclass(frozen=True)
 class Place:
-    """All states of a result at the numbers of a labelled point, and the way out of each stable one that has one, by name."""
+    """All states of a result at the numbers of a labelled point, and the way out of each stable one that has one, by name.
 
+    The point is in the ``row`` of the table of points.
+    """
+
+    row: int
     stage: int
     column: str
     value: float
@@ -63,16 +68,14 @@ def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
     found = []
     rows = list(chosen_rows(branch, stable=True))
     with Progress("places with barriers", len(rows), quiet) as progress:
-        for row in rows:
+        for row in progress.each(rows, partial(_where, branch)):
             stage = int(branch.points["stage"][row])
             column = branch.followed(stage)
-            place = Place(stage, column, float(branch.points[column][row]), states_at(branch, row), {})
-            progress.part(_words(branch, place))
+            place = Place(row, stage, column, float(branch.points[column][row]), states_at(branch, row), {})
             mechanics = branch.stages[stage - 1]
             if {0, 1} <= {state.index for state in place.states} and not mechanics.chains.unsupported(mechanics.strip):
                 place.ways.update(_ways(place.states))
                 found.append(place)
-            progress.part_done()
     return found
 
 
@@ -197,11 +200,9 @@ def falls(branch: OpenBranch, quiet: bool = True) -> list[Fall]:
         for event in branch.events if event["label"] == b"LP" and 0 in (event["index_before"], event["index_after"])
     ]  # fmt: skip
     with Progress("folds", len(rows), quiet) as progress:
-        found = []
-        for row in rows:
-            progress.part(branch.followed(int(branch.points["stage"][row])))
-            found.append(_fall(branch, row))
-            progress.part_done()
+        found = [
+            _fall(branch, row) for row in progress.each(rows, lambda row: branch.followed(int(branch.points["stage"][row])))
+        ]
     return [fall for fall in found if fall is not None]
 
 
@@ -235,7 +236,7 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
     lines = [f"to leave stable states{energies_in}:"] if found else []
     for place in found:
         energies = {state.name: state.potential for state in place.states}
-        lines.append(f"  {_words(branch, place)}:")
+        lines.append(f"  {_where(branch, place.row)}:")
         for state in place.states:
             if state.index != 0:
                 continue
@@ -244,8 +245,7 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
             lines.append(f"{head}: {_way(way, energies, factor)}")
     lines += [f"past folds at which stable states end{energies_in}:"] if snaps else []
     for fall in snaps:
-        where = _at(branch, fall.column, float(branch.points[fall.column][fall.row]), int(branch.points["stage"][fall.row]))
-        lines.append(f"  {where}, point {fall.row}: {told(branch, fall)}")
+        lines.append(f"  {_where(branch, fall.row)}, point {fall.row}: {told(branch, fall)}")
     return lines
 
 
@@ -255,12 +255,10 @@ def told(branch: OpenBranch, fall: Fall) -> str:
     return f"falls into {into}, which releases {fall.released * branch.scene.factor('potential'):.6g}"
 
 
-def _words(branch: OpenBranch, place: Place) -> str:
-    return _at(branch, place.column, place.value, place.stage)
-
-
-def _at(branch: OpenBranch, column: str, value: float, stage: int) -> str:
-    number = exact_text(float(f"{value * branch.scene.factor(column):.6g}"))
+def _where(branch: OpenBranch, row: int) -> str:
+    stage = int(branch.points["stage"][row])
+    column = branch.followed(stage)
+    number = exact_text(float(f"{branch.points[column][row] * branch.scene.factor(column):.6g}"))
     return f"{column} = {number} {branch.scene.unit(column)}".rstrip() + f" of stage {stage}"
 
 

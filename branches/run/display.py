@@ -10,7 +10,8 @@ import shutil
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from branches.store.command import write_output
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: the line is to be shown whi
     from branches.scene.stage import Stage
     from contin import Point, Stop
 
+Part = TypeVar("Part")
 #: Every that many regular points one is printed between the labelled ones.
 _EVERY = 5
 
@@ -148,9 +150,8 @@ class Progress(Display):
     Examples
     --------
     >>> with Progress("branches", total=2) as progress:
-    ...     for name in ("(1, 2)", "(1, 3)"):
-    ...         progress.part(name)  # "0 of 2 branches done, 1 s so far: (1, 2)"
-    ...         progress.part_done()  # "1 of 2 branches done, 1 s so far, about 1 s to go"
+    ...     for m, n in progress.each([(1, 2), (1, 3)], str):
+    ...         pass  # "1 of 2 branches done, 1 s so far, about 1 s to go: (1, 3)"
     """
 
     #: The lines that are open. A line inside the block of another one is shown in its place.
@@ -189,6 +190,13 @@ class Progress(Display):
     def expect(self, total: int) -> None:
         """Set the number of parts."""
         self._total = total
+
+    def each(self, parts: Iterable[Part], name: Callable[[Part], str]) -> Iterator[Part]:
+        """Yield the parts of the work; each one is shown by its name until the next one is asked for."""
+        for part in parts:
+            self.part(name(part))
+            yield part
+            self.part_done()
 
     def part(self, name: str) -> None:
         """Say which part begins."""

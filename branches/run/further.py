@@ -37,13 +37,9 @@ def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
     found = []
     rows = list(chosen_rows(branch))
     with Progress("places searched", len(rows), quiet) as progress:
-        for row in rows:
-            column = branch.followed(int(branch.points["stage"][row]))
-            known = states_at(branch, row)
-            if known:
-                progress.part(column)
+        for row in progress.each(rows, lambda row: branch.followed(int(branch.points["stage"][row]))):
+            if known := states_at(branch, row):
                 found.append(_searched(branch, row, known, draws))
-            progress.part_done()
     return found
 
 

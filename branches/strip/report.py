@@ -230,10 +230,8 @@ def dimensions(strip: Strip, m: int, wanted: float, quiet: bool = True) -> str:
     """Return, for each dimension, its values for which the loop of m turns has the ``wanted`` barrier (J), as text."""
     lines = [f"for a stable {circle_name(m)} with a barrier of {wanted:g} J, change one dimension:"]
     with Progress("dimensions", len(VARIED), quiet) as progress:
-        for name in VARIED:
-            progress.part(name.replace("_", " "))
+        for name in progress.each(VARIED, lambda name: name.replace("_", " ")):
             lines.append(_line(strip, name, m, wanted))
-            progress.part_done()
     return "\n".join(lines) + "\n"
 
 
@@ -287,13 +285,11 @@ def chart(strip: Strip, m: int, out: Path, quiet: bool = True, Gammas=_GAMMAS, p
     """
     kappas, table = [], []
     with Progress("widths", len(Gammas), quiet) as progress:
-        for Gamma in Gammas:
-            progress.part(f"Gamma = {Gamma:.3g}")
+        for Gamma in progress.each(Gammas, "Gamma = {:.3g}".format):
             parameters = strip.parameters | {"Gamma": float(Gamma)}
             low, high = np.clip(linear.energy_interval(FINITE_WIDTH, m, parameters), *_LONGEST)
             kappas.append(m * (low + (high - low) * parts))
             table.append(barriers_at(m, kappas[-1], parameters))
-            progress.part_done()
     write_picture(_figure(strip, m, Gammas, np.array(kappas), np.array(table)), out)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -93,8 +94,7 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
     states, folds, lost, seen = [], [], [], []
     modes = [(m, n) for m in coverings(strip) for n in range(1, coverings(strip)[-1] + 2) if n != m]
     with Progress("branches", len(modes), quiet) as progress:
-        for m, n in modes:
-            progress.part(f"({m}, {n})")
+        for m, n in progress.each(modes, str):
             known = folds if (m, n) == (1, 2) else []
             try:
                 found = list(at_natural_curvatures(m, n, [strip.kappa_n], strip.parameters, known))
@@ -106,7 +106,6 @@ def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[s
                 if not any(n == other and np.allclose(place, there, **near) for other, there in seen):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
-            progress.part_done()
     return states, folds, lost
 
 
@@ -156,12 +155,10 @@ def ways_out(states: Sequence[State], quiet: bool = True) -> dict[str, Barrier]:
     stable, saddles = [state for state in states if state.stable], [state for state in states if state.index == 1]
     found = []
     with Progress("ways out", len(saddles), quiet) as progress:
-        for saddle in saddles:
-            progress.part(saddle.name)
+        for saddle in progress.each(saddles, attrgetter("name")):
             ends = None if saddle.equilibrium is None else sides(saddle.equilibrium)
             if ends is not None:
                 found.append((saddle.name, saddle.energy, *(_name(end, stable) for end in ends)))
-            progress.part_done()
     return barriers([(state.name, state.energy) for state in stable], found)
 
 
@@ -170,13 +167,11 @@ def by_hand(strip: Strip, states: Sequence[State], ways: Mapping[str, Barrier], 
     energies, found = {state.name: state.energy for state in states}, {}
     rings = [state for state in states if state.m and state.name in ways]
     with Progress("foldings", len(rings), quiet) as progress:
-        for ring in rings:
-            progress.part(ring.name)
+        for ring in progress.each(rings, attrgetter("name")):
             path = folding(FINITE_WIDTH, ring.m, strip.kappa_n, strip.parameters)
             end = math.nan if path is None else _energy(strip, path.energies[-1])
             if path is not None and abs(end - energies[ways[ring.name].saddle]) < levels.APART * strip.energy_unit:
                 found[ring.name] = path
-            progress.part_done()
     return found
 
 
