@@ -1,5 +1,6 @@
 """Shared by all tests: one thread each, the option ``--full``, workers, and the order of modules."""
 
+import gc
 import os
 import signal
 import sys
@@ -29,6 +30,9 @@ FIRST = (
 )  # fmt: skip
 #: Each worker imports everything and needs up to a gigabyte.
 MOST_WORKERS = 8
+
+
+gc.disable()  # until all tests are collected: nothing of that is garbage
 
 
 def pytest_addoption(parser):
@@ -92,6 +96,11 @@ def pytest_collection_modifyitems(config, items):
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
     assert all(path.exists() for path in places), "FIRST names a module that is not there"
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def pytest_collection_finish():
+    gc.freeze()  # modules and tests stay to the end: nobody looks through them for garbage
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)
