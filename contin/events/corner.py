@@ -154,7 +154,7 @@ def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Wa
         there = with_outcomes(system, x, dict(zip(zero, sides)))
         with np.errstate(all="ignore"):
             jacobian = there.slopes(x)
-            if not np.isfinite(jacobian).all():
+            if not all(np.isfinite(there.slopes(place)).all() for place in (x, *_beside(x, LOCATED))):
                 missing = "derivatives are not finite"  # as those of a root that begins there
                 continue
             if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
@@ -171,12 +171,17 @@ def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Wa
     return found, missing, bends
 
 
+def _beside(x: Array, part: float) -> Array:
+    """Return two places on both sides of x, shape (2, size)."""
+    step = part * (1 + np.abs(x)) * np.sign(random_rows(1, x.size)[0])
+    return np.array([x + step, x - step])
+
+
 def _tangents(system: Discretization, x: Array) -> list[Array]:
     """Return the unit tangents at x, both ways; where two branches cross with these outcomes, those of both."""
-    row = random_rows(1, system.size)[0] * np.sqrt(system.weights)
-    beside = x + ROUGH * (1 + np.abs(x)) * np.sign(row)
-    least, largest = (np.linalg.svd(system.slopes(place), compute_uv=False) for place in (x, beside))
-    if least[-1] > LOCATED * largest[0]:
+    slopes = [each for each in map(system.slopes, (x, *_beside(x, ROUGH))) if np.isfinite(each).all()]
+    if np.linalg.svd(slopes[0], compute_uv=False)[-1] > LOCATED * max(np.linalg.norm(each) for each in slopes):
+        row = random_rows(1, system.size)[0] * np.sqrt(system.weights)
         found = [linearization(system, x, row).tangent]
     else:
         try:

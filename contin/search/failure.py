@@ -105,7 +105,7 @@ def doubtful(system: System, done: Corrected) -> str:
     """Return why a solution is none, as a sentence: conditions follow from others, or the equations are not finite; or ""."""
     if not np.isfinite(system.residual(done.x)).all() and (found := _not_finite(system, done.x)):
         return f"solution: {found}: {_advice(found)}"
-    return dependence(system, done.x) if _is_plain(system) and not _response(system, done) < 1 / DEPENDENT else ""
+    return dependence(system, done.x) if not _response(system, done) < 1 / DEPENDENT else ""
 
 
 def _response(system: System, done: Corrected) -> float:

@@ -186,7 +186,7 @@ def solved(
         x = carry(done.x)
     else:
         done = corrected(system, x)
-    _check_determined(system, done, explains)
+    _check_determined(system, done)
     system.check_solution(done.x)
     point = point_of(system, done.x, done.iterations, done.error)
     return dataclasses.replace(point, label=label_of(system, done.x)) if done.singular else point
@@ -228,6 +228,8 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
             return correct_away(system, x, others, newton)
         done = correct(system, x, newton=newton, sizes=system.magnitudes)
         system.check_solution(done.x)
+        if explains and (why := doubtful(system, done)):
+            raise ProblemError(why)
         return looked_at(system, done) if explains else done
     except ConvergenceError as error:
         if not others and (found := recovered(system, x, newton, explains)):
@@ -251,9 +253,9 @@ def _advice(system: System) -> str:
     )
 
 
-def _check_determined(system: System, done: Corrected, explains: bool) -> None:
+def _check_determined(system: System, done: Corrected) -> None:
     """Check that a solution does not come with others around it, of which round-off chose one."""
-    if why := system.undetermined(done.x) or (explains and doubtful(system, done)):
+    if why := system.undetermined(done.x):
         raise ProblemError(why)
 
 
