@@ -228,9 +228,11 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
             return correct_away(system, x, others, newton)
         done = correct(system, x, newton=newton, sizes=system.magnitudes)
         system.check_solution(done.x)
-        if explains and (why := doubtful(system, done)):
-            raise ProblemError(why)
-        return looked_at(system, done) if explains else done
+        if not explains:
+            return done
+        if doubt := doubtful(system, done):
+            raise ProblemError(doubt)
+        return looked_at(system, done)
     except ConvergenceError as error:
         if not others and (found := recovered(system, x, newton, explains)):
             return found
