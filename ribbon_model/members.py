@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ribbon_model import ends, natural_state
+from ribbon_model import ends
 from ribbon_model.ends import LOOSE, Vector, product
 from ribbon_model.equilibrium import directors
+from ribbon_model.section import helix
 from ribbon_model.shape import quaternions
 
 #: Kinds of joints.
@@ -55,7 +56,7 @@ class Member:
 
     def drawn(self, s: float | np.ndarray) -> np.ndarray:
         """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
-        own = natural_state.helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
+        own = helix(np.array(self.strains, dtype=float), np.asarray(s, dtype=float))
         q = np.array(product(self.frame, tuple(own[:, :4].T))).T
         return np.hstack([q, np.array(self.place) + own[:, 4:] @ np.array(directors(*self.frame)).reshape(3, 3)])
 

@@ -21,12 +21,12 @@ import numpy as np
 
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
 from contin.lowlevel import Collocation, Continuation, Undetermined, shown
-from ribbon_model import ends, first_guesses, law_end, loads, natural_state
+from ribbon_model import ends, first_guesses, law_end, loads
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PHASES, PLACE, End, Roller
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.first_guesses import Guess
 from ribbon_model.loads import FORCES, LOADS, STROKE
-from ribbon_model.section import Section
+from ribbon_model.section import Section, natural_end, natural_states
 from ribbon_model.shape import Shape, shape_of
 
 #: Columns of the reactions.
@@ -132,10 +132,10 @@ class OpenStrip:
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
         names = ends.numbers_of(self.finish)
-        natural = {} if set(names) <= set(self.numbers) else natural_state.end_numbers(self.section)
+        natural = {} if set(names) <= set(self.numbers) else natural_end(self.section)
         prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
         if self.roller is not None:
-            place = natural_state.states_at(self.section, [self.roller.at])[0, 4:] @ self.roller.direction
+            place = natural_states(self.section, [self.roller.at])[0, 4:] @ self.roller.direction
             prescribed["roller"] = self.numbers.get("roller", float(place))
         loaded = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
         return {**prescribed, **loaded, **self.section.parameters}
@@ -333,7 +333,7 @@ class OpenStrip:
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
-        return s, np.hstack([natural_state.states_at(self.section, s), np.zeros((len(s), self.conditions_inside))])
+        return s, np.hstack([natural_states(self.section, s), np.zeros((len(s), self.conditions_inside))])
 
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
@@ -351,7 +351,7 @@ class OpenStrip:
 
     def _not_found(self) -> str:
         """Return that no first state was found, and which numbers may be nearer to where one is known."""
-        natural = natural_state.end_numbers(self.section)
+        natural = natural_end(self.section)
         far = [name for name, value in natural.items() if abs(self.parameters.get(name, value) - value) > LOOSE]
         loads = [name for name in LOADS if self.parameters.get(name, 0.0) != 0]
         nearer = [f"smaller loads ({', '.join(loads)})"] if loads else []

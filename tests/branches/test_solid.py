@@ -13,8 +13,7 @@ from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.parse import parse
-from ribbon_model.natural_state import states_at
-from ribbon_model.section import section_of
+from ribbon_model.section import natural_states, section_of
 from ribbon_model.shape import Shape, frames, shape_of
 
 WIDTH, THICKNESS, CELLS = 0.06, 0.004, 2000
@@ -27,7 +26,7 @@ def strip(ruled=False, **strains) -> Shape:
     rod = section_of("rod", {"B1": 1.0, "B2": 1.0, "C": 1.0, **strains})
     t = np.linspace(0, 1, CELLS + 1)
     omega = np.tile([strains.get(name, 0.0) for name in ("kappa_n", "kappa_2", "tau_n")], (len(t), 1))
-    return shape_of(t, states_at(rod, t), omega if ruled else 0 * omega)
+    return shape_of(t, natural_states(rod, t), omega if ruled else 0 * omega)
 
 
 def ring(half_twists: int) -> Shape:
@@ -113,7 +112,7 @@ def test_a_straight_strip_is_a_block():
 def test_bounding_boxes_of_an_arc_a_loop_and_a_twisted_strip():
     sagitta = (1 + THICKNESS) - (1 - THICKNESS) * math.cos(1.0)  # radius 1/2, opened by 2: halves of inner and outer circle
     arc = box(solid(STRIPS["arc"], WIDTH, THICKNESS))
-    turn = frames(states_at(section_of("rod", {"B1": 1, "B2": 1, "C": 1, "kappa_n": 2.0}), [0.5]))[0]
+    turn = frames(natural_states(section_of("rod", {"B1": 1, "B2": 1, "C": 1, "kappa_n": 2.0}), [0.5]))[0]
     mesh = solid(STRIPS["arc"], WIDTH, THICKNESS)
     seen = np.ptp(mesh.vertices @ turn.T, axis=0)  # on the axes of its middle
     chord = (1 + THICKNESS) * math.sin(1.0)
