@@ -32,9 +32,9 @@ def _later(module: str, name: str) -> Callable[[Path], Section]:
 
 #: What can be asked for: name -> function(folder) -> Section; it may write pictures into the folder.
 ITEMS: dict[str, Callable[[Path], Section]] = {
-    "table1": _later("branches.paper.tables", "table1"),
-    "table2": _later("branches.paper.tables", "table2"),
-    "table3": _later("branches.paper.tables", "table3"),
+    "table1": _later("branches.paper.circles", "table1"),
+    "table2": _later("branches.paper.circles", "table2"),
+    "table3": _later("branches.paper.circles", "table3"),
     "fig6": _later("branches.paper.unfolding", "fig6"),
     "fig9": _later("branches.paper.circles", "fig9"),
     "fig10": _later("branches.paper.circles", "fig10"),
