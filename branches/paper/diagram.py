@@ -6,6 +6,7 @@ Fig. 12b shows where stable planar and stable buckled states exist; the paper gu
 from __future__ import annotations
 
 import math
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -68,15 +69,16 @@ def fig12(folder: Path) -> Section:
     pictures = [keep(draw_diagram(graph, law, NU), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
     ahead = preview(parse(FIG12, "fig12", ["law=ribbon"]))
     pictures.insert(1, keep(draw_diagram(ahead, "ribbon", NU), folder, "fig12_preview"))
-    rows = [
-        Row(f"{law}: different branches", "", _families(graph, law), "m = 1, 3, 5, 7, n ≤ 7, |κₙL/2π| ≤ 100") for law in LAWS
-    ]
+    count = Counter(family[0] for family in diagram.families(graph))
+    rows = [Row(f"{law}: different branches", "", count[law], "m = 1, 3, 5, 7, n ≤ 7, |κₙL/2π| ≤ 100") for law in LAWS]
     for m, printed in ((1, "3.33"), (3, "10.")):
-        remark = f"m/ν, (27) for n → ∞; n = 7 is at {_threshold(graph, m, 7):.3f}"
+        threshold = diagram.course(graph, m, 7, "ribbon", NU)[0]["nodes"][0]["kappa_n"]
+        remark = f"m/ν, (27) for n → ∞; n = 7 is at {threshold:.3f}"
         rows.append(Row(f"ribbon: bifurcations of m = {m} accumulate at κₙL/2π =", printed, m / NU, remark))
     for law in LAWS:
-        rows.append(Row(f"{law}: folds on (1, 2)", FOLDS_PUBLISHED.get(law, "0"), _folds_of(graph, law, 1, 2), "section 6.3"))
         near = diagram.course(graph, 1, 2, law, NU)[0]["nodes"]
+        folds = sum(node["kind"] == "fold" for node in near)
+        rows.append(Row(f"{law}: folds on (1, 2)", FOLDS_PUBLISHED.get(law, "0"), folds, "section 6.3"))
         rows.append(Row(f"{law}: (1, 2) ends on covering", "3", near[-1]["covering"], f"at κₙL/2π = {near[-1]['kappa_n']:.6f}"))
     worst, table = _fold_rows(graph)
     notes = [
@@ -99,19 +101,6 @@ def computed(folder: Path):
     """The diagram of all branches, with stability; read if it is in the folder already."""
     run_many(parse(FIG12, "fig12"), folder / "fig12", Display(quiet=True))
     return read(folder / "fig12")
-
-
-def _families(graph, law) -> int:
-    return sum(family[0] == law for family in diagram.families(graph))
-
-
-def _folds_of(graph, law, m, n) -> int:
-    (branch,) = diagram.course(graph, m, n, law, NU)
-    return sum(node["kind"] == "fold" for node in branch["nodes"])
-
-
-def _threshold(graph, m, n) -> float:
-    return diagram.course(graph, m, n, "ribbon", NU)[0]["nodes"][0]["kappa_n"]
 
 
 def _rises(graph) -> str:
@@ -157,7 +146,8 @@ def fig12b(folder: Path) -> Section:
         pieces, guesses = found[law], _guesses(graph, law)
         for branch in sorted(set(pieces) | set(guesses)):
             guess, ours = guesses.get(branch, []), pieces.get(branch, [])
-            remark = "agrees" if _same(guess, ours) else "the generic scenario of section 6.3 does not hold here"
+            same = len(guess) == len(ours) and np.allclose(guess, ours, atol=1e-6)
+            remark = "agrees" if same else "the generic scenario of section 6.3 does not hold here"
             words = [", ".join(_interval(*piece) for piece in pieces) or "none" for pieces in (guess, ours)]
             rows.append(Row(f"{law}: branch {branch} stable for κₙL/2π in", words[0], words[1], remark))
     notes = [
@@ -172,10 +162,6 @@ def fig12b(folder: Path) -> Section:
 
 def _interval(low, high) -> str:
     return f"({'−∞' if low == -math.inf else f'{low:.4f}'}, {'∞' if high == math.inf else f'{high:.4f}'})"
-
-
-def _same(guess, ours) -> bool:
-    return len(guess) == len(ours) and np.allclose(guess, ours, atol=1e-6)
 
 
 def _guesses(graph, law) -> dict[tuple[int, int], list[tuple[float, float]]]:

@@ -69,17 +69,12 @@ def report(branch: OpenBranch, draws: int, quiet: bool = True) -> list[str]:
         tried = f"{place.account.guesses.total()} guesses; {place.account.stop}"
         lines.append(f"  {where} of stage {place.stage}: {len(place.known)} known, {len(place.found)} more ({tried})")
         energies = [state.potential for state in place.known]
-        lines += [
-            f"    energy {state.potential * factor:.6g}{_image(state.potential, energies)}, index {_words(state.index)}"
-            for state in place.found
-        ]
+        for state in place.found:
+            index = "unknown" if state.index < 0 else state.index
+            lines.append(f"    energy {state.potential * factor:.6g}{_image(state.potential, energies)}, index {index}")
     return [*lines, "  what no guess leads to is not found: there may be more"]
 
 
 def _image(energy: float, known: list[float]) -> str:
     """Return words for a state with the energy of a known one."""
     return " (that of a known state)" if any(abs(energy - one) <= levels.APART * (1 + abs(one)) for one in known) else ""
-
-
-def _words(index: int) -> str:
-    return "unknown" if index < 0 else str(index)

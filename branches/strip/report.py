@@ -75,7 +75,7 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
         f"{'circle  radius mm  stable for natural radii (mm)':57s}  {'here':14s}  moment N m   energy J  strain",
         *(_circle_line(strip, ring, yield_strain) for ring in rings),
         *(
-            f"{name}, where its stable state ends: natural radius {_millimetres(strip.radius(value))}"
+            f"{name}, where its stable state ends: natural radius {1e3 * strip.radius(value):.4g} mm"
             for name, value in folds[:1]
         ),
         "",
@@ -182,10 +182,6 @@ def _by_hand(strip: Strip, foldings: Mapping[str, Folding]) -> Iterator[str]:
             f"{name:18s}  {couple:10.4g} N m at most, at {math.degrees(angle):.0f} degrees; "
             f"beyond {math.degrees(end):.0f} degrees it goes on by itself"
         )
-
-
-def _millimetres(metres: float) -> str:
-    return f"{1e3 * metres:.4g} mm"
 
 
 #: Dimensions that are varied, one at a time, from a fifth of the given value to five times it, at so many places.

@@ -178,8 +178,7 @@ def by_hand(strip: Strip, states: Sequence[State], ways: Mapping[str, Barrier], 
 def _name(end: Segments, stable: Sequence[State]) -> str | None:
     """Return the name of the stable state in which a strip of segments rests, None for another one."""
     m = covering_index(end)
-    return next((state.name for state in stable if (state.m == m if m else _is_buckled(end, state))), None)
-
-
-def _is_buckled(end: Segments, state: State) -> bool:
-    return state.equilibrium is not None and is_at(end, state.equilibrium)
+    for state in stable:
+        if state.m == m if m else state.equilibrium is not None and is_at(end, state.equilibrium):
+            return state.name
+    return None
