@@ -22,8 +22,7 @@ from branches.explore.__main__ import main
 from branches.explore.gather import gather
 from branches.explore.packing import TOLERANCE
 from branches.explore.packing import column as packed_column
-from branches.explore.solutions import solutions
-from branches.explore.strips import shapes
+from branches.explore.strips import shapes, solutions
 from branches.read import read_branch
 from branches.run.display import Display
 from branches.run.many import run_many
