@@ -23,8 +23,8 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.events.labelled import finding_of
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.statement import PERIOD, ROUNDS, declared
-from contin.results import plot, table
-from contin.results.branch import Branch
+from contin.results import plot
+from contin.results.branch import Branch, diagram_to_html
 from contin.results.marks import Axes
 from contin.results.point import Point
 from contin.results.record import system_of
@@ -117,7 +117,7 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         branches = [(branch.points, branch.stop) for branch in self.branches]
-        return table.diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes), self._told())
+        return diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes), self._told())
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.
