@@ -10,7 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from branches.draw.notebook import MOST_ROWS
 from branches.graph.kinds import graph_kind
 from branches.graph.parts import add, counts
 from branches.graph.stored import DIAGRAM, new_graph, read_any, save
@@ -21,6 +20,7 @@ from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import difference, dump, parse
 from branches.scene.stages import stages_of
 from branches.scene.sweep import Sweep
+from branches.store.branch import MOST_ROWS
 from branches.store.files import ANOTHER_DIAGRAM, StoreError, another_scene, only_run, prepare, write_bytes
 from branches.store.read import read_branch
 

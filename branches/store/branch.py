@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import html
+import io
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from branches.draw.notebook import MOST_ROWS
 from branches.draw.strip import OBLIQUE, View
 from branches.draw.style import smooth
 from branches.scene.columns import Columns
@@ -22,10 +23,13 @@ from branches.scene.parse import dump
 from branches.scene.stages import stages_of
 from branches.store.files import StoreError
 
-if TYPE_CHECKING:  # the mechanics of a kind of strip are imported with its stages
+if TYPE_CHECKING:
     from branches.scene.stage import Stage
     from contin.lowlevel import Collocation
     from ribbon_model.shape import Shape
+
+#: Labelled points that the table in a notebook lists: about a screen. The others are counted.
+MOST_ROWS = 20
 
 
 @dataclass(frozen=True)
@@ -343,9 +347,24 @@ class StoredBranch(ABC):
         return figure(self, shapes, width, x, y, view)
 
     def _repr_html_(self) -> str:
-        from branches.draw.notebook import to_html
-
-        return to_html(self)
+        """Return the branch as HTML, for a notebook: name, reason of its end, picture, labelled points."""
+        picture = io.StringIO()
+        self.plot(shapes=0).savefig(picture, format="svg")
+        svg = picture.getvalue()[picture.getvalue().index("<svg") :]
+        stop = html.escape(self.stop or self.status)
+        table = {key: values[self.events["point"]].tolist() for key, values in self.in_units().items()}
+        titles = {key.partition(" [")[0]: key for key in table}  # with units
+        columns = {}
+        for name in self.shown:
+            columns[titles.get(name, name)] = table[titles[name]] if name in titles else self.events[name].tolist()
+        head = "".join(f"<th>{html.escape(title)}</th>" for title in columns)
+        events = [*zip(*columns.values())]
+        rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in events[:MOST_ROWS])
+        more = f"<p>and {len(events) - MOST_ROWS} more labelled points</p>" if len(events) > MOST_ROWS else ""
+        return (
+            f"<div><p><b>{html.escape(self.about)}</b>: {len(self.points)} points; {stop}</p>{svg}"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}</div>"
+        )
 
     # --- tables ---------------------------------------------------------------------------------------------------------
 
@@ -390,3 +409,8 @@ class StoredBranch(ABC):
         }
         about = {"config": self.scene_text(), "status": self.status, "stop": self.stop}
         return xarray.Dataset(variables, {"point": self.points["point"]}, about)
+
+
+def _cell(value) -> str:
+    text = value.decode() if isinstance(value, bytes) else str(value)
+    return f"<td>{value:.10g}</td>" if isinstance(value, float) else f"<td>{html.escape(text)}</td>"
