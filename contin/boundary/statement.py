@@ -402,7 +402,44 @@ class Piece(NamedTuple):
         return shown(self)
 
 
-class SegmentedProblem(BoundaryValueProblem):
+class InSegments:
+    """What problems of several segments share: their equality, and guesses with one part for each segment."""
+
+    segments: tuple[Any, ...]
+    pieces: tuple[Piece, ...]
+    _stated: dict[str, Any]
+
+    def _compared(self) -> dict[str, Any]:
+        segments = {f"{name} {i}": value for i, each in enumerate(self.segments) for name, value in vars(each).items()}
+        return {name: value for name, value in self._stated.items() if name != "segments"} | segments
+
+    def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
+        """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
+
+        Others are returned as they are.
+
+        Raises
+        ------
+        ProblemError
+            Another number of them.
+        """
+        if not isinstance(guess, list) or not any(callable(g) or isinstance(g, (list, tuple, np.ndarray)) for g in guess):
+            return guess
+        if len(guess) != len(self.pieces):
+            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(self.pieces)} segments")
+        extents = [piece.extent(parameters) for piece in self.pieces]
+
+        def states(t: float) -> Array:
+            parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, (a, b) in zip(guess, extents)]
+            for index, (part, segment) in enumerate(zip(parts, self.segments)):
+                if part.size != (count := len(segment.states)):
+                    raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
+            return np.concatenate(parts)
+
+        return states
+
+
+class SegmentedProblem(InSegments, BoundaryValueProblem):
     """A boundary value problem on several intervals, with conditions between their ends.
 
     Parameters
@@ -440,9 +477,6 @@ class SegmentedProblem(BoundaryValueProblem):
     [0.25 1.  ] [0.5 1. ]
     """
 
-    segments: tuple[Segment, ...]
-    pieces: tuple[Piece, ...]
-
     def __init__(self, segments: Sequence[Segment], boundary: Function, parameters: Mapping[str, float]) -> None:
         given = tuple(checks.sequence("segments", segments, "Segment"))
         if not given:
@@ -471,44 +505,11 @@ class SegmentedProblem(BoundaryValueProblem):
             found |= {f"length {number}": [parameters], f"begin {number}": [parameters]}
         return found
 
-    def _compared(self) -> dict[str, Any]:
-        parts = ("rhs", "states", "length", "begin", "functionals")
-        segments = {f"{part} {i}": getattr(segment, part) for i, segment in enumerate(self.segments) for part in parts}
-        return {name: value for name, value in self._stated.items() if name != "segments"} | segments
-
     def __reduce__(self) -> Any:
         """Carry the functions of segments as recordings, too, where no other process finds them by name."""
         make, (kind, stated) = super().__reduce__()
         segments = [segment.portable(piece.names, tuple(self.parameters)) for segment, piece in zip(self.segments, self.pieces)]
         return make, (kind, {**stated, "segments": segments})
-
-    def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
-        """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
-
-        Raises
-        ------
-        ProblemError
-            Another number of them.
-        """
-        return joined_guess(guess, self.pieces, [len(piece.names) for piece in self.pieces], parameters)
-
-
-def joined_guess(guess: object, pieces: Sequence[Piece], counts: Sequence[int], parameters: Mapping[str, float]) -> Any:
-    """Return a guess of all states, on [0, 1], of a list with one for each segment, of so many states; others as they are."""
-    if not isinstance(guess, list) or not any(callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess):
-        return guess
-    if len(guess) != len(pieces):
-        raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(pieces)} segments")
-    extents = [piece.extent(parameters) for piece in pieces]
-
-    def states(t: float) -> Array:
-        parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, (a, b) in zip(guess, extents)]
-        for index, (part, count) in enumerate(zip(parts, counts)):
-            if part.size != count:
-                raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
-        return np.concatenate(parts)
-
-    return states
 
 
 def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:

@@ -23,10 +23,10 @@ from contin.boundary.canonical import Canonical, EndConditions, Variation, canon
 from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, second_variation, stability_of
 from contin.boundary.statement import (
     BoundaryValueProblem,
+    InSegments,
     Piece,
     Quantity,
     between,
-    joined_guess,
     joint_names,
     side_by_side,
     sums,
@@ -354,7 +354,7 @@ class VariationalSegment:
         return VariationalSegment(**{each.name: carried(each.name, getattr(self, each.name)) for each in fields(self)})
 
 
-class SegmentedVariationalProblem(VariationalProblem):
+class SegmentedVariationalProblem(InSegments, VariationalProblem):
     """Stationary points of the energy of several segments, with conditions between their ends.
 
     E = sum over the segments of the integral of L_i(s, x_i, w_i, p) ds, plus an energy of the ends. What is not held at an end
@@ -407,9 +407,6 @@ class SegmentedVariationalProblem(VariationalProblem):
     -0.2
     """
 
-    segments: tuple[VariationalSegment, ...]
-    pieces: tuple[Piece, ...]
-
     @checks.arguments
     def __init__(
         self, segments: Sequence[VariationalSegment], parameters: Mapping[str, float], *, ends: Function | None = None,
@@ -453,26 +450,12 @@ class SegmentedVariationalProblem(VariationalProblem):
             found |= {f"{name} {i}": arguments for name, arguments in segment.signatures(parameters).items()}
         return found
 
-    def _compared(self) -> dict[str, Any]:
-        segments = {f"{name} {i}": value for i, each in enumerate(self.segments) for name, value in vars(each).items()}
-        return {name: value for name, value in self._stated.items() if name != "segments"} | segments
-
     def __reduce__(self) -> Any:
         """Carry the functions of segments as recordings, too, where no other process finds them by name."""
         make, (kind, stated) = super().__reduce__()
         known: dict[Any, Any] = {}
         segments = [segment.portable(self.variation.parameters, known) for segment in self.segments]
         return make, (kind, {**stated, "segments": segments})
-
-    def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
-        """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
-
-        Raises
-        ------
-        ProblemError
-            Another number of them.
-        """
-        return joined_guess(guess, self.pieces, [len(segment.states) for segment in self.segments], parameters)
 
 
 def _between_both(function: Function, pieces: Sequence[Piece]) -> Function:
