@@ -97,14 +97,15 @@ def _condition(name: str, k: int) -> Event:
     def between(arc: Arc, _: object) -> list[SpecialPoint] | None:
         if arc.passes(test):
             return None
-        part = comes_near(test, arc.before, arc.trial)
-        for _ in range(_LOOKS if part else 0):
+        part, looks = comes_near(test, arc.before, arc.trial), 0
+        while ROUGH < part < 1 - ROUGH and looks < _LOOKS:
             there = arc.low + part * (arc.step - arc.low), arc.near(arc.low + part * (arc.step - arc.low))
             if there[1].value(test) >= 0:
                 return [arc.locate(test, (arc.low, arc.before), there)]
-            ends = np.array([end.value(test) for end in (arc.before, there[1], arc.trial)])
-            bend, slope, _ = np.polyfit([0.0, part, 1.0], ends, 2)
-            part = min(max(-slope / (2 * bend), 0.0), 1.0) if bend < 0 else 0.0
+            first, middle, last = (end.value(test) for end in (arc.before, there[1], arc.trial))
+            slope = (middle - first) / part
+            bend = (last - first - slope) / (1 - part)  # of the parabola through all three
+            part, looks = (part - slope / bend) / 2 if bend < 0 else 0.0, looks + 1
         return []
 
     test = Event(Label.CORNER, name, beyond, terminal=True, limit=True, search=between)
