@@ -3,6 +3,7 @@ in another order, under other names, cut. Labelled points, their values, index, 
 """
 
 import functools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -126,8 +127,8 @@ def _compare(fields: dict, change: str, folder: Path, first=None) -> None:
     redrawn = Redrawn(fields, change)
     one = _result(fields, folder / "one.h5") if first is None else first
     other = _result(redrawn.changed(), folder / "other.h5")
-    if isinstance(one, str):  # both can move, or forces are undetermined in both
-        assert isinstance(other, str) and one.partition("energy")[2] == other.partition("energy")[2]
+    if isinstance(one, str):  # both can move, or forces are undetermined in both: the same words, with the names of either
+        assert isinstance(other, str) and set(one.split()) == set(re.sub(r"\b[jt]_", "", other).split()), other
         return
     assert not isinstance(other, str), other
     a, b = one.events, other.events
@@ -160,24 +161,30 @@ def _compare(fields: dict, change: str, folder: Path, first=None) -> None:
             )
 
 
+#: Where the first stage of scenes ends here that take long: behind their first branch points.
+ENDS = {"network_arches": 36.0, "network_bigon_ring": 3.7, "network_hexagon": 1.1, "network_hexagram": 0.9}
+
+
 @functools.cache
 def _shipped(name: str) -> dict:
     """The fields of a shipped scene, up to the first stage that leaves a branch point: to either side, as its mode is drawn."""
     fields = yaml.safe_load((CONFIGS / f"{name}.yaml").read_text("utf-8"))
     leaves = [number for number, stage in enumerate(fields["stages"]) if str(stage.get("start_at", "")).startswith("BP")]
-    return fields | {"stages": fields["stages"][: leaves[0] if leaves else None]}
+    first, *stages = fields["stages"][: leaves[0] if leaves else None]
+    return fields | {"stages": [first | {"to": ENDS.get(name, first["to"])}, *stages]}
 
 
 NAMES = sorted(path.stem for path in CONFIGS.glob("network_*.yaml"))
-#: Tried by default, as it is short.
-QUICK = ("network_weight",)
+#: Short: tried by default, and each change by itself with --full.
+QUICK = "network_weight"
 
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=[pytest.mark.full, pytest.mark.hours]) for name in NAMES]
+    ("name", "change"),
+    [(QUICK, "all"), *(pytest.param(name, "all", marks=pytest.mark.full) for name in NAMES if name != QUICK)]
+    + [pytest.param(QUICK, one, marks=pytest.mark.full) for one in CHANGES[1:]],
 )  # fmt: skip
-@pytest.mark.parametrize("change", [one if one == "all" else pytest.param(one, marks=pytest.mark.full) for one in CHANGES])
 def test_shipped_networks_are_the_same_however_they_are_drawn(name, change, tmp_path):
     _compare(_shipped(name), change, tmp_path)
 
@@ -189,7 +196,7 @@ def _random(seed: int) -> dict:
     def vector(size=1.0):
         return (size * rng.standard_normal(3)).round(3).tolist()
 
-    kind, count = ("row", "ring", "tree")[seed % 3], int(rng.integers(2, 4))
+    kind, count = ("row", "ring", "tree")[seed % 3], int(rng.integers(2, 5))
     places = [vector() for _ in range(count + (kind != "ring"))]
     far = {"row": lambda i: i + 1, "ring": lambda i: (i + 1) % count, "tree": lambda i: i + 1}[kind]
     near = {"row": lambda i: i, "ring": lambda i: i, "tree": lambda i: int(rng.integers(i + 1))}[kind]
@@ -211,11 +218,14 @@ def _random(seed: int) -> dict:
     return {
         "material": {"law": "rod", **stiffness, "kappa_n": round(float(rng.uniform(-1, 1)), 3), "tau_n": 0.2},
         "strips": strips, "joints": joints, "held": held, "loads": loads, "numbers": {"weight": 0.5} if seed % 2 else {},
-        "stages": [{"follow": "P", "to": 0.3}],
+        "stages": [{"follow": "P", "to": 1.0}],
     }  # fmt: skip
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("seed", [1, 0, *range(2, 30)])
+#: A load that a joint bears, one that is refused as strips can move, and one under weight: tried by default.
+FEW = (1, 9, 27)
+
+
+@pytest.mark.parametrize("seed", [*FEW, *(pytest.param(n, marks=pytest.mark.full) for n in range(30) if n not in FEW)])
 def test_random_networks_are_the_same_however_they_are_drawn(seed, tmp_path):
     _compare(_random(seed), "all", tmp_path)
