@@ -551,13 +551,12 @@ class Network:
             raise ProblemError(self._reason(error)) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
-            told = f": {self._reason(first)}" if first else ""
             nearest = max(way, key=lambda point: point[ASSEMBLY])
             left = [f"{(1 - nearest[ASSEMBLY]) * size:.3g} at {name}" for name, size in self.gaps.items()]
-            told = f" (gaps are left of {', '.join(left)}){told}" if left else told
             reason = OutOfReach(
                 f"joints: from the drawing without stress, natural strains, loads and gaps could be followed to "
-                f"{nearest[ASSEMBLY]:.3g} of the way; draw the network nearer to a state{told}"
+                f"{nearest[ASSEMBLY]:.3g} of the way; draw the network nearer to a state"
+                + (f" (gaps are left of {', '.join(left)})" if left else "")
             )
             reason.nearest = nearest
             raise reason
@@ -652,7 +651,7 @@ class Network:
     @property
     def force(self) -> float:
         """The size of forces: the smallest stiffness over the square of the length of the longest strip."""
-        return self._sizes["sigma"]
+        return self._sizes["lam_x1" if len(self.members) == 1 else "lam_x1_0"]
 
     @property
     def longest(self) -> float:
@@ -783,7 +782,7 @@ class Network:
         moment = min(stiffness, default=1.0) / length
         force = moment / length
         own = set(self._of_sections)
-        found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": force}
+        found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": max(force, moment)}
         found |= dict.fromkeys([name for name in self._prescribed if name.endswith(MOVES)], length)
         found |= dict.fromkeys(self.loads, force) | dict.fromkeys(
             [name for name in (*POTENTIALS, FOLLOWER) if name in found], force / length

@@ -62,6 +62,7 @@ class SecondVariation:
     eigenvalues: Array
     _vectors: Array
     _parts: tuple[_Part, ...]
+    _sizes: Array
     known: float = 0.0
 
     def __repr__(self) -> str:
@@ -95,7 +96,7 @@ class SecondVariation:
         found = np.empty((len(t), sum(len(part.states) for part in self._parts)))
         for part in self._parts:
             found[:, part.states], unknowns = part.profile.at(unknowns[: part.size], t), unknowns[part.size :]
-        return found
+        return found * self._sizes
 
     def broken(self, count: int, symmetries: Mapping[str, Symmetry]) -> tuple[str, ...]:
         """Return the names of those symmetries that the ``count`` modes nearest to zero break."""
@@ -286,7 +287,7 @@ def second_variation(system: Collocation, x: Array, phases: bool = True) -> Seco
             return None
         parts.append(_part(system, own, *local))
     values, vectors = _reduced(system, x, parts, phases)
-    return SecondVariation(values, vectors, tuple(parts))
+    return SecondVariation(values, vectors, tuple(parts), _sizes(system)[: system.problem.dimension])
 
 
 def _part(system: Collocation, states: Indices, pieces: _Pieces, inside: Array) -> _Part:
@@ -348,19 +349,29 @@ def _products(weights: Array, a: Array, b: Array) -> Array:
 
 
 def _jacobians(system: Collocation, x: Array) -> list[tuple[Indices, Array]]:
-    """Return the states x of each part of the problem, n of them, and derivatives at the Gauss points, in the user's units.
+    """Return the states x of each part of the problem, n of them, and derivatives at the Gauss points, in units of their sizes.
 
     They are those of the rates of these x and lambda and of the integrands, by x and lambda: shape (N d, 2 n + n_int, 2 n).
     """
     batch, count = system.problem.batch("field"), system.problem.dimension
-    points, columns, found = system.states_at_gauss_points(x), batch.columns([]), []
+    points, columns, found, sizes = system.states_at_gauss_points(x), batch.columns([]), [], _sizes(system)
     entries = batch.entries(system.gauss_times, points, points[:0], system.all_parameters(x), columns)[1]
     for states in system.separate_states:
         own = states[states < count]
         both = np.concatenate([own, count + own])
         rows = np.append(both, np.arange(2 * count, batch.count))  # and the integrands
-        found.append((own, columns.block(entries, rows, both)))
+        of = np.append(sizes[both], np.ones(batch.count - 2 * count))
+        found.append((own, columns.block(entries, rows, both) * sizes[both] / of[:, None]))
     return found
+
+
+def _sizes(system: Collocation) -> Array:
+    """Return the sizes of x and lambda (2n,), whose products are all one energy; ones unless the problem states its own."""
+    n, stated = system.problem.dimension, system.problem.sizes
+    names = list(system.problem.states)
+    energy = stated.get(names[0], 1.0) * stated.get(names[n], 1.0)
+    own = np.array([stated.get(name, 1.0) for name in names[:n]])
+    return np.concatenate([own, energy / own])
 
 
 def _roots(hll: Array) -> tuple[Array, Array] | None:
@@ -478,10 +489,13 @@ def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     by_ends = np.concatenate([jacobian[:, :n], jacobian[:, 2 * n : 3 * n]], axis=1)
     fixed = problem.canonical.fixed
     free = [[i for i in range(n) if i not in places] for places in fixed]
+    sizes = _sizes(system)
+    by_ends *= np.tile(sizes[:n], 2)
     conditions = len(jacobian) - len(free[0]) - len(free[1])
     second = np.zeros((2 * n, 2 * n))
     second[free[0]] = -by_ends[conditions : conditions + len(free[0])]
     second[[n + i for i in free[1]]] = by_ends[conditions + len(free[0]) :]
+    second /= np.tile(sizes[n:], 2)[:, None]
     held = [i for places, offset in zip(fixed, (0, n)) for i in (offset + place for place in places)]
     second[:, held] = 0.0  # they do not move
     return by_ends[:conditions], (second + second.T) / 2

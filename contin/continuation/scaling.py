@@ -73,7 +73,8 @@ def scaled(
     names, stated = [*states, *system.free], settings.scales
     sizes, held = system.largest(x), dict(zip(problem.parameters, np.abs(system.parameters)))
     values = {**held, **dict(zip(names, sizes))}
-    stated = {name: max(size, values[name]) for name, size in declared(problem, "sizes").items()} | dict(stated)
+    own = {name: max(size, values[name]) for name, size in declared(problem, "sizes").items()}
+    stated = own | dict(stated)
     alike: Mapping[str, str] = getattr(problem, "alike", {})
     given = {name: values[other] for name, other in alike.items() if values[other] >= USUAL[0]} | stated
     unknown = [name for name, size in zip(names, sizes) if max(size, given.get(name, 0.0)) < USUAL[0]]
@@ -86,7 +87,8 @@ def scaled(
     known = dict(zip(names, sizes))
     sizes = np.array([stated.get(name, known[alike.get(name, name)]) for name in names])
     of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
-    found = usual(sizes[: len(states)]), usual(np.array([of_parameters[name] for name in problem.parameters]))
+    by_name, both = {**of_parameters, **dict(zip(states, sizes))}, (states, list(problem.parameters))
+    found = [usual(np.array([by_name[name] for name in names]), np.isin(names, [*own])) for names in both]
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
 
 

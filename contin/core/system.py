@@ -18,7 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from contin import errors as checks
-from contin.arrays import Array, Indices
+from contin.arrays import Array, Indices, Pattern
 from contin.collocation.mesh import MeshControl
 from contin.core.differences import derivative
 from contin.core.protocol import Carrier, Discretization
@@ -75,10 +75,10 @@ def largest_entries(entries: Callable[[Array], Array], x: Array) -> Array:
     return np.maximum(here, np.where(np.isfinite(beside), beside, 0.0))
 
 
-def usual(sizes: Array | float) -> Array:
-    """Return sizes as powers of two; 1 for those of everyday size, and for zero, infinity and NaN."""
+def usual(sizes: Array | float, stated: Pattern | bool = False) -> Array:
+    """Return sizes as powers of two; 1 for those of everyday size that are not stated, and for zero, infinity and NaN."""
     sizes = np.abs(sizes)
-    odd = np.isfinite(sizes) & (sizes > 0) & ((sizes < USUAL[0]) | (sizes > USUAL[1]))
+    odd = np.isfinite(sizes) & (sizes > 0) & (stated | (sizes < USUAL[0]) | (sizes > USUAL[1]))
     return np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
 
 

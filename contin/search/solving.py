@@ -21,14 +21,14 @@ from contin.continuation.first import ROUNDS_OF_MESHES
 from contin.core.newton import Corrected, Newton, correct
 from contin.core.protocol import Discretization, inner
 from contin.core.step import ROUNDS
-from contin.core.system import System
+from contin.core.system import System, usual
 from contin.draws import ASIDE
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import APART, MOST_STEPS
 from contin.linalg.orientation import first_least
 from contin.problems.angles import winding_names
-from contin.problems.statement import forget_changed, with_multipliers
+from contin.problems.statement import declared, forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
 from contin.search.failure import dependence, doubtful, label_of, looked_at, not_finite_near, recovered
@@ -144,7 +144,18 @@ def solve(
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, _degree(problem, guess, control, degree)))
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
-    return solved(system, x, control, newton, others, held, explains=True)
+    return solved(*_sized(system, x), control, newton, others, held, explains=True)
+
+
+def _sized(system: System, x: Array) -> tuple[System, Array]:
+    """Return the system with the sizes that the problem states, and x for it."""
+    problem = system.problem
+    if not (stated := declared(problem, "sizes")):
+        return system, x
+    known = dict(zip((*problem.states, *system.free), system.largest(x)))
+    sizes = {name: max(size, known.get(name, 0.0)) for name, size in stated.items()}
+    both = ([sizes.get(name, 1.0) for name in names] for names in (problem.states, problem.parameters))
+    return system.with_scales(x, *(usual(np.array(one), True) for one in both))
 
 
 def _degree(

@@ -739,10 +739,15 @@ def test_a_gap_that_was_closed_is_said(tmp_path, capsys):
     assert "stage 1: the drawing has a gap of 0.02 at C, which was closed" in capsys.readouterr().out
 
 
-@pytest.mark.full
-def test_a_frame_of_a_millimetre_buckles_as_one_of_a_metre():
-    """k L cot(k L) = -6: L = 1e-3 and B = 1e-9, as in m and N m^2, have forces of 1e-3."""
-    network = parse(_portal("rod, B1: 1.0e-9, B2: 4.0e-9, C: 0.8e-9", 1e-3) + "numbers: {P: 0.007}\n", "scene.yaml").strip()
-    branch = trace(network.first_point()[0], free=["P"], limits={"P": (0.007, 0.0076)}, progress=False)
+@pytest.mark.parametrize(
+    ("L", "B"),
+    [(1e-3, 1e-9), *(pytest.param(*both, marks=pytest.mark.full) for both in [(1e3, 1e6), (1e3, 1e-9), (1e-3, 1e6)])],
+)  # fmt: skip
+def test_a_frame_buckles_alike_in_all_units(L, B):
+    """k L cot(k L) = -6, with as many steps: L = 1e-3 and B = 1e-9, as in m and N m^2, have forces of 1e-3."""
+    force = B / L**2
+    network = parse(_portal(f"rod, B1: {B:e}, B2: {4 * B:e}, C: {0.8 * B:e}", L, to=9 * force), "scene.yaml").strip()
+    branch = trace(network.first_point()[0], free=["P"], limits={"P": (0, 8 * force)}, progress=False)
     (point,) = branch.labelled("BP")
-    assert (point["P"], point.index_change) == (pytest.approx(1e-3 * 2.71645974768613**2, rel=1e-9), (0, 1))
+    assert (point["P"], point.index_change) == (pytest.approx(force * 2.71645974768613**2, rel=1e-9), (0, 1))
+    assert len(branch) < 20
