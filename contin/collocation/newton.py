@@ -1,6 +1,4 @@
-"""Newton's method on a mesh in one call of a kernel, and the arrays in which it works.
-
-Newton's method on a mesh in one call of a kernel, which decides as `contin.core.newton` does.
+"""Newton's method on a mesh in one call of a kernel, which decides as `contin.core.newton` does, and the arrays it works in.
 
 It serves functions that are recorded, meshes of one segment, and linear conditions besides. What it cannot decide by itself,
 whether updates that no longer shrink are round-off, is left to Python.

@@ -18,38 +18,9 @@ import numpy as np
 from contin.arrays import Array
 from contin.collocation import newton as one_call
 from contin.collocation.defect import estimate, estimate_of
+from contin.continuation import plain_on_mesh as on_mesh
+from contin.continuation import rules
 from contin.continuation.plain import Quotient, Rooms, plain_steps
-from contin.continuation.plain_on_mesh import (
-    ASK,
-    AWAY,
-    CALM,
-    MAY_BRANCH,
-    TURNS,
-    MeshRooms,
-    ends_are_calm,
-    multipliers_ask,
-    rests,
-    step_on_mesh,
-)  # fmt: skip
-from contin.continuation.rules import (
-    ARCLENGTH,
-    CLOSES,
-    ERROR,
-    ERROR_LEFT,
-    ITERATIONS,
-    JUDGED,
-    MESH_ERROR,
-    NUMBERS,
-    SIGN,
-    SIGN_OF,
-    STEP,
-    UPDATES,
-    Attempt,
-    Control,
-    Frame,
-    Path,
-    Watch,
-)  # fmt: skip
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
@@ -137,16 +108,16 @@ class Lane(ABC):
         self._wants = bool(others) or system.index is not None or settings.trivial is not None
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         newton, (angle, accuracy) = settings.newton, aims(settings, system)
-        self._frame = Frame(system.weights, system.state_size, system.free_scales)
-        self._attempt = Attempt(np.empty(system.size), np.empty(SUMS), np.zeros(JUDGED))
-        self._control = Control(
+        self._frame = rules.Frame(system.weights, system.state_size, system.free_scales)
+        self._attempt = rules.Attempt(np.empty(system.size), np.empty(SUMS), np.zeros(rules.JUDGED))
+        self._control = rules.Control(
             newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step,
             primary, STILL if system.intervals else -1.0,
         )  # fmt: skip
         held = [test for test in tests if test.holds_one_of(system.free)]
         ends = np.array([settings.limits.get(name, (-np.inf, np.inf)) for name in system.free], dtype=float)
         sides = [(1.0 if test.value == settings.limits[test.column][1] else -1.0) if test.limit else 0.0 for test in held]
-        self._watch = Watch(
+        self._watch = rules.Watch(
             int(settings.branch_points), int(any(self.knows(test) for test in tests)), int(noisy),
             np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
             np.array([test.value for test in held], dtype=float), np.array(sides), ends[:, 0].copy(), ends[:, 1].copy(),
@@ -167,30 +138,31 @@ class Lane(ABC):
         """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
 
     @abstractmethod
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
         """Make plain steps from row 1 of a path, the state's point ``here``."""
 
     def steps(self, state: State, most: int, here: Trial) -> Block:
         """Make plain steps from a state, no more than ``most``; ``here`` is its point."""
         size = state.x.size
-        path = Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.zeros((most + 2, NUMBERS)))
+        path = rules.Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.zeros((most + 2, rules.NUMBERS)))
         bent = state.previous_tangent is not None
         path.x[1], path.tangents[1] = state.x, state.tangent
         path.tangents[0] = state.previous_tangent if bent else 0.0
-        path.numbers[1, : MESH_ERROR + 1] = (
+        path.numbers[1, : rules.MESH_ERROR + 1] = (
             state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0, state.discretization_error,
         )  # fmt: skip
         self._handed = None
         return Block(self.system, state, path, self._make(path, state.accepted, int(bent), here), self._handed)
 
-    def _trial(self, path: Path, number: int, factors: Factorization | None = None) -> Trial:
+    def _trial(self, path: rules.Path, number: int, factors: Factorization | None = None) -> Trial:
         """Return the point of a row of a path, with factors right there if these are at hand."""
-        return Trial(self.system, path.x[number], Linearization(path.tangents[number], path.numbers[number, SIGN_OF], factors))
+        linear = Linearization(path.tangents[number], path.numbers[number, rules.SIGN_OF], factors)
+        return Trial(self.system, path.x[number], linear)
 
     def _asks(self, before: Trial, trial: Trial, told: Array) -> bool:
         """Return whether a step asks for a closer look by what the kernel does not know, be it that this is not found."""
         try:
-            closes = told[CLOSES] and returned(self._start, before, trial, told[STEP])
+            closes = told[rules.CLOSES] and returned(self._start, before, trial, told[rules.STEP])
             return bool(closes) or self._passes(before, trial)
         except ConvergenceError:
             return True
@@ -228,9 +200,9 @@ class SmallLane(Lane):
         circles = np.append(system.circles, np.zeros(system.size - system.state_size))
         return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
 
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
         made, indices = int(plain_steps(self._rooms, path, accepted, bent)), list[int | None]()
-        if not (self._wants or path.numbers[2 : made + 2, CLOSES].any()):
+        if not (self._wants or path.numbers[2 : made + 2, rules.CLOSES].any()):
             return made, None
         for before, end in itertools.pairwise(self._trial(path, number) for number in range(1, made + 2)):
             if self._asks(before, end, path.numbers[len(indices) + 2]):
@@ -247,7 +219,7 @@ class MeshLane(Lane):
         settings, newton, n = self.settings, self.settings.newton, system.states_count
         autonomous = system.size_of_solutions is not None
         self._work, self._factors = system.workspace, [system.unfilled_factors(), system.unfilled_factors()]
-        rooms = MeshRooms(
+        rooms = on_mesh.MeshRooms(
             self._work, self._factors[0].room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
             np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
             self._frame, self._attempt, self._control, self._watch,
@@ -280,30 +252,30 @@ class MeshLane(Lane):
         home, x, _ = self._start
         return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
-    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> _Made:
+    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
         values, begun, indices = self._work.values, self._begun(path, here), list[int | None]()
         if begun is None:
             return 0, None
         before, now = begun
         time = 1.0 if self._monodromy is None else self.system.unit_time(path.x[1])
-        error = path.numbers[1, MESH_ERROR]
+        error = path.numbers[1, rules.MESH_ERROR]
         poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
             now, after = 1 - now, self._factors[1 - now]
-            bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
-            step = step_on_mesh(self._rooms[now], path, accepted, number, bend)
-            asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
+            bend = 0.5 / path.numbers[number - 1, rules.STEP] if number > 2 or bent else 0.0
+            step = on_mesh.step_on_mesh(self._rooms[now], path, accepted, number, bend)
+            asks = step <= 0 or (self._still and on_mesh.rests(values.field, values.points.shape[1], self._still))
             if not asks:
-                found, clear = MAY_BRANCH, self._compared(after.room, 0)
+                found, clear = on_mesh.MAY_BRANCH, self._compared(after.room, 0)
                 if self._monodromy is not None:
                     earlier, time = time, self.system.unit_time(path.x[number])
-                    found = multipliers_ask(self._monodromy, self.spectra, values.jacobian, time / earlier)
-                asks = found == ASK or not (found == AWAY or self._stays_regular(clear, before, after))
+                    found = on_mesh.multipliers_ask(self._monodromy, self.spectra, values.jacobian, time / earlier)
+                asks = found == on_mesh.ASK or not (found == on_mesh.AWAY or self._stays_regular(clear, before, after))
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
-                path.numbers[number, MESH_ERROR] = error
+                path.numbers[number, rules.MESH_ERROR] = error
                 asks = not error <= poor
-            if not asks and (self._wants or path.numbers[number, CLOSES]):
+            if not asks and (self._wants or path.numbers[number, rules.CLOSES]):
                 begin = here if self._wants else self._trial(path, number - 1, before)
                 here = self._trial(path, number, after)
                 asks = self._asks(begin, here, path.numbers[number])
@@ -319,7 +291,7 @@ class MeshLane(Lane):
         self._left = path.x[-1], (before, now)
         return len(path.x) - 2, indices or None
 
-    def _begun(self, path: Path, here: Trial) -> _Begun | None:
+    def _begun(self, path: rules.Path, here: Trial) -> _Begun | None:
         """Prepare steps from row 1 of a path, the point ``here``; return what is known there, None where that is not found.
 
         It is what the steps of the call before have left, where they end there.
@@ -339,26 +311,27 @@ class MeshLane(Lane):
                 return None
             factors = self._factors[0]
         self._compared(factors.room, 1)
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self.spectra, values.jacobian, 0.0) == ASK:
+        given = self._monodromy, self.spectra, values.jacobian, 0.0
+        if self._monodromy is not None and on_mesh.multipliers_ask(*given) == on_mesh.ASK:
             return None
         return factors, 0
 
     def _compared(self, factored: Factored, begins: int) -> int:
         """Return what condensed matrices say of a step that ends at a matrix."""
         if not self._watched:
-            return CALM
+            return on_mesh.CALM
         before, after = self._relations[::-1]
         self._relations = [before, after]
-        return int(ends_are_calm(self._work.mesh, factored, before, after, self._quotient, begins))
+        return int(on_mesh.ends_are_calm(self._work.mesh, factored, before, after, self._quotient, begins))
 
     def _stays_regular(self, clear: int, before: Factorization, after: Factorization) -> bool:
         """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""
-        return changes_little(before, after, self.system.size) if clear == TURNS else clear == CALM
+        return changes_little(before, after, self.system.size) if clear == on_mesh.TURNS else clear == on_mesh.CALM
 
-    def _hand_over(self, path: Path, number: int, step: float, both: tuple[Factorization, Factorization]) -> None:
+    def _hand_over(self, path: rules.Path, number: int, step: float, both: tuple[Factorization, Factorization]) -> None:
         """Keep a step that was made and asks for a closer look, with the factors at both ends: the lane takes others."""
-        sign, iterations, error = self._attempt.judged[[SIGN, UPDATES, ERROR]].tolist()
-        both[0].sign, both[1].sign = float(path.numbers[number - 1, SIGN_OF]), sign
+        sign, iterations, error = self._attempt.judged[[rules.SIGN, rules.UPDATES, rules.ERROR]].tolist()
+        both[0].sign, both[1].sign = float(path.numbers[number - 1, rules.SIGN_OF]), sign
         first, last = (
             Linearization(tangent.copy(), factors.sign, factors)
             for tangent, factors in zip(path.tangents[number - 1 : number + 1], both)
@@ -406,7 +379,7 @@ class Block:
         The step behind them, where a kernel has made it and it asks for a closer look: its length, its beginning and its end.
     """
 
-    def __init__(self, system: Any, base: State, path: Path, made: _Made, handed: Handed | None) -> None:
+    def __init__(self, system: Any, base: State, path: rules.Path, made: _Made, handed: Handed | None) -> None:
         self._system, self._base, self._path, self.handed = system, base, path, handed
         self.made, self._indices = made
 
@@ -432,8 +405,8 @@ class Block:
         values = np.empty((self.made, len(names)))
         values[:] = system.parameters
         values[:, system._free] = self._free(x[2 : self.made + 2])
-        arclengths = (numbers[1 : self.made + 1, ARCLENGTH] + numbers[2 : self.made + 2, STEP]).tolist()
-        told = numbers[2 : self.made + 2, (ITERATIONS, ERROR_LEFT, MESH_ERROR)].tolist()
+        arclengths = (numbers[1 : self.made + 1, rules.ARCLENGTH] + numbers[2 : self.made + 2, rules.STEP]).tolist()
+        told = numbers[2 : self.made + 2, (rules.ITERATIONS, rules.ERROR_LEFT, rules.MESH_ERROR)].tolist()
         indices = [None] * self.made if self._indices is None else self._indices
         for row, given, arclength, (iterations, error, mesh_error), index in zip(
             rows, values.tolist(), arclengths, told, indices

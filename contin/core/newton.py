@@ -17,20 +17,7 @@ import numpy as np
 from contin import draws
 from contin import errors as checks
 from contin.arrays import Array
-from contin.collocation.newton import (
-    CLOSE,
-    CONVERGED,
-    ERROR,
-    EXACT,
-    ITERATIONS,
-    NOT_FINITE,
-    SIGN,
-    STAGNATES,
-    UPDATES,
-    Control,
-    Workspace,
-    correct_on_mesh,
-)  # fmt: skip
+from contin.collocation import newton as one_call
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError
 from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
@@ -151,7 +138,7 @@ def correct(
 
 def _in_one_call(
     system: Any,
-    work: Workspace,
+    work: one_call.Workspace,
     guess: Sequence[float] | Array,
     row: Array | None,
     target: float | Array,
@@ -173,19 +160,19 @@ def _in_one_call(
     own = system.fill_conditions(values)
     if row is not None:
         values.rows[own], values.targets[own] = row, target
-    x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
+    x, report = np.array(guess, dtype=float), np.empty(one_call.UPDATES + max(newton.max_iterations, CHORDS))
     factors = system.unfilled_factors() if near is None else near
-    tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
-    done = correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
-    iterations, error = int(report[ITERATIONS]), float(report[ERROR])
+    tangent, control = np.empty(x.size), one_call.Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
+    done = one_call.correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
+    iterations, error = int(report[one_call.ITERATIONS]), float(report[one_call.ERROR])
     if near is None:
-        factors.sign = float(report[SIGN])
-    if done == CONVERGED:
+        factors.sign = float(report[one_call.SIGN])
+    if done == one_call.CONVERGED:
         return Corrected(x, factors, iterations, error, tangent if linearize else None)
-    if done == NOT_FINITE:
+    if done == one_call.NOT_FINITE:
         raise ConvergenceError("the equations are not finite at the corrected point")
-    updates = report[UPDATES : UPDATES + iterations].tolist()
-    if done == STAGNATES or (near is None and updates[-1] <= STAGNANT):
+    updates = report[one_call.UPDATES : one_call.UPDATES + iterations].tolist()
+    if done == one_call.STAGNATES or (near is None and updates[-1] <= STAGNANT):
         return None
     raise _failure(updates)
 
@@ -423,9 +410,9 @@ def _chords(
             residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
             sizes.append(subtract(x, update))
-            if sizes[-1] <= EXACT:
+            if sizes[-1] <= one_call.EXACT:
                 return Corrected(x, factors, len(sizes), sizes[-1])
-            if not sizes[-1] < CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
+            if not sizes[-1] < one_call.CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
                 break
             if len(sizes) > 1:
                 ratio = sizes[-1] / sizes[-2]

@@ -1,10 +1,8 @@
-"""The piece of a curve inside a step: points of it at any distance, and zeros of functions on it.
+"""The piece of a curve inside a step: points of it at any distance, and zeros of functions, as far as round-off allows.
 
-A zero of a scalar function, located as far as round-off allows.
-
-Not SciPy's: each evaluation is a correction by Newton's method, and on the 206 zeros of the test bank this method takes 4.0 of
-them a zero, `scipy.optimize.brentq` 5.3 and `toms748` 5.9. It begins with a guess where there is one, and stops where the
-values no longer fall.
+The method for zeros is not SciPy's: each evaluation is a correction by Newton's method, and on the 206 zeros of the test bank
+this method takes 4.0 of them a zero, `scipy.optimize.brentq` 5.3 and `toms748` 5.9. It begins with a guess where there is one,
+and stops where the values no longer fall.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """Several zeros inside a step: dips of a test function, and whether multipliers can have passed and come back.
 
-All zeros of a function along a step: places between which it changes its sign once at most, as far as is seen.
-
 The sign at both ends tells one zero. Two leave it as it was: between places on the cubic the function changes its sign and
 comes back, or a parabola through three places dips towards zero. A dip is followed to its lowest place by further parabolas,
 until the function has the other sign there, or its values no longer sink.

@@ -151,14 +151,10 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     first, last = _matched(left, right)
     changed = (first.real > 0) != (last.real > 0)
     if hasattr(system, "autonomous"):  # logarithms of multipliers: a negative one is real, and alone
-        changed &= ~(_is_negative(first) & _is_negative(last))
+        apart = np.abs(np.abs([first.imag, last.imag]) - math.pi)
+        changed &= (apart >= DOUBLED).any(axis=0)
     upper = (first.imag > -DOUBLED * (1 + np.abs(first))) | (last.imag > -DOUBLED * (1 + np.abs(last)))
     return first[changed & upper], last[changed & upper]
-
-
-def _is_negative(logarithms: ComplexArray) -> Any:
-    """Return which logarithms belong to negative multipliers."""
-    return np.abs(np.abs(logarithms.imag) - math.pi) < DOUBLED
 
 
 def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:

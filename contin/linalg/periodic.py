@@ -1,6 +1,4 @@
-"""Floquet multipliers: transition matrices of intervals, and eigenvalues of their product, which is never formed.
-
-Eigenvalues of a product of matrices that is never formed: Floquet multipliers of any size, each to relative accuracy.
+"""Floquet multipliers: transition matrices of intervals, and eigenvalues of their product, of any size, to relative accuracy.
 
 The product P = F_N ... F_1 of transition matrices may have eigenvalues of 1e8 and 1e-16, or far beyond what numbers hold. With
 orthogonal Q_j and upper triangular R_j, F_j Q_{j-1} = Q_j R_j, so

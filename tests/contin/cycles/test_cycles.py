@@ -7,7 +7,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
-from contin.continuation import lane
+from contin.continuation import plain_on_mesh
 from contin.cycles import equations as cycles
 from contin.events import hopf
 
@@ -248,7 +248,7 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
         return counting
 
     monkeypatch.setattr(cycles, "fill_multipliers", counted(cycles.fill_multipliers))
-    monkeypatch.setattr(lane, "multipliers_ask", counted(lane.multipliers_ask))
+    monkeypatch.setattr(plain_on_mesh, "multipliers_ask", counted(plain_on_mesh.multipliers_ask))
     rest = contin.solve(AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0}), [math.sqrt(8 / 3 * 19)] * 2 + [19.0])
     (hopf,) = contin.trace(rest, free=["r"], limits={"r": (19, 26)}).labelled("HB")
     branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)
