@@ -12,7 +12,7 @@ from typing import NamedTuple
 from contin.arrays import Array
 from contin.collocation import newton as one_call
 from contin.collocation.newton import Mesh, Workspace
-from contin.collocation.round import KNOWN, Monodromy, fill_multipliers, nearest_to_one
+from contin.collocation.round import DRIFTED, KNOWN, Monodromy, fill_multipliers, nearest_to_one
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
@@ -40,6 +40,9 @@ def _product(row: Array, x: Array) -> float:
 
 #: What multipliers say of a step: look closer; nothing; that a branch point or a fold may lie in it.
 ASK, AWAY, MAY_BRANCH = range(3)
+#: Where the multiplier that is 1 has drifted, logarithms of others are known to about as much: they are clear of the circle at
+#: this many times that distance. Ten times smaller may be too near; ten times larger, more steps are looked at closely.
+_CLEAR = 100.0
 #: What condensed matrices say: nothing, as relations turn too much; that no singular value comes near zero; that one may.
 TURNS, CALM, CHANGES = range(3)
 
@@ -150,15 +153,17 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: 
             b = room.order[c]
             for a in range(n):
                 room.jacobian[q, a, b] = jacobian[q, a, c]
-    if fill_multipliers(room, 0) != KNOWN:
+    known = fill_multipliers(room, 0)
+    if known not in (KNOWN, DRIFTED):
         return ASK
     trivial, least = nearest_to_one(room) if room.autonomous else (-1, 0.0)
+    clear = APART if known == KNOWN else _CLEAR * least
     at = 0
     for a in range(n):
         x, y = room.real[a], room.imaginary[a]
         if a == trivial:
             continue
-        if not abs(x) >= APART or not math.hypot(x, y) > AS_FAR * least:
+        if not abs(x) >= clear or not math.hypot(x, y) > AS_FAR * least:
             return ASK
         spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
         at += 1

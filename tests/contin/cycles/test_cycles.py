@@ -256,6 +256,20 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     assert len(calls) - 2 * 6 < 4 * len(branch)
 
 
+def test_a_multiplier_that_has_drifted_from_1_needs_no_closer_look(monkeypatch):
+    """On 70 intervals of degree 2 that of the Lorenz cycles is off by 4e-6; the others are far from the circle."""
+    asked, kernel, mesh = [], plain_on_mesh.multipliers_ask, MeshControl(min_intervals=70, max_intervals=70)
+    monkeypatch.setattr(plain_on_mesh, "multipliers_ask", lambda *given: asked.append(kernel(*given)) or asked[-1])
+    rest = contin.solve(AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 24.0}), [math.sqrt(8 / 3 * 23)] * 2 + [23.0])
+    (hopf,) = contin.trace(rest, free=["r"], limits={"r": (20, 26)}).labelled("HB")
+    start = contin.trace(hopf, branch=1, limits={"r": (15, 25)}, max_points=10, errors=False)[-1]
+    orbit = contin.solve(start.system.problem, start, degree=2, intervals=70, mesh=mesh)
+    asked.clear()
+    contin.trace(orbit, free=["r"], step=0.05, max_step=0.05, max_points=20, mesh=mesh, errors=False)
+    assert orbit.system.is_drifted(orbit.x)
+    assert len(asked) > 20 and plain_on_mesh.ASK not in asked
+
+
 def test_a_branch_that_begins_at_a_hopf_point_is_read_back(tmp_path):
     """Its first point is a cycle without a size; from there, and from others, the branch is followed again."""
 
