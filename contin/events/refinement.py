@@ -16,7 +16,7 @@ from contin.core.settings import Settings
 from contin.core.step import ROUNDS, located, standing_at
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
-from contin.events.arc import SpecialPoint
+from contin.events.arc import SpecialPoint, Value, find_zero
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, Finding, finding_of
 from contin.levels import CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
@@ -32,6 +32,9 @@ _HALVINGS = 4
 #: A value that is not below this part of the nearest to zero came no nearer. Ten times smaller, secants that still come nearer
 #: count as round-off; ten times larger, round-off that is smaller by chance does not.
 _NEARER = 0.1
+#: A value above this part of that at the distance `ROUGH` is not near zero: secants over such a distance may take a function
+#: that bends for round-off. Ten times smaller, each point that moves by 1e-6 takes some more corrections.
+_FAR_OFF = 1e-2
 #: So many of these in a row are round-off: one may be due to the curvature between the first two places.
 _BLURRED = 2
 #: Where it fails, the place is known as far as the function grows on both sides, with different signs: distances at which it
@@ -267,6 +270,8 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     best, other = (0.0, value, here), (ROUGH, test.function(beside), beside)
     if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:
         return here, _stands_still_to(lambda s: test.function(at(s)))  # its value there is that of the fold
+    if abs(value) > _FAR_OFF * abs(other[1]) and (near := _bracketed(lambda s: test.function(at(s)), best[:2], other[:2])):
+        best = near, test.function(at(near)), at(near)
     slope, blurred = abs(other[1] - value) / ROUGH, [0.0]
     for _ in range(MOST_UPDATES):
         best, other = sorted((best, other), key=lambda place: abs(place[1]))
@@ -285,6 +290,16 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     if len(blurred) > _BLURRED and max(blurred) < slope * ROUGH:
         return best[2], max(blurred) / slope
     return here, _known_to(lambda s: test.function(at(s)))
+
+
+def _bracketed(function: Callable[[float], float], here: Value, beside: Value) -> float | None:
+    """Return a zero of a function between a place and one beside it on either side; None where it keeps its sign."""
+    if here[1] * beside[1] > 0:
+        beside = -beside[0], function(-beside[0])
+    try:
+        return find_zero(function, here, beside, LOCATED) if here[1] * beside[1] < 0 else None
+    except ConvergenceError:
+        return None
 
 
 def _stands_still_to(function: Callable[[float], float]) -> float:

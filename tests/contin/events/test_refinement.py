@@ -1,6 +1,7 @@
 """Error estimates of special points: not smaller than the error, and none where the point is not found again."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,14 @@ def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
     assert len(points) == len(known)
     for point, length in zip(points, known):
         assert abs(point["L"] - length) < point.errors["L"] < 1e-6
+
+
+@pytest.mark.parametrize("zero", [1.4e-6, -2e-5, 3e-12])
+def test_a_zero_of_a_function_that_bends_at_once_is_no_round_off(zero):
+    """The function is 1 at the first distance of the secants: 0 was returned for the first zero, and nothing for the second."""
+    test = SimpleNamespace(function=lambda s: math.tanh(1e5 * (s - zero)), label="PD")
+    place, apart = refinement._by_secants(lambda s: s, 0.0, test)
+    assert abs(place - zero) < 1e-13 and apart < 1e-9
 
 
 def foundation(t, u, p):
