@@ -311,8 +311,8 @@ class MeshLane(Lane):
                 return None
             factors = self._factors[0]
         self._compared(factors.room, 1)
-        given = self._monodromy, self.spectra, values.jacobian, 0.0
-        if self._monodromy is not None and on_mesh.multipliers_ask(*given) == on_mesh.ASK:
+        room, jacobian = self._monodromy, values.jacobian
+        if room is not None and on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK:
             return None
         return factors, 0
 
