@@ -34,7 +34,7 @@ from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import finding_of, frequency_of
 from contin.events.normal_forms import flip, pair
 from contin.events.refinement import ASIDE
-from contin.levels import LOCATED
+from contin.levels import DOUBLED, LOCATED
 
 if TYPE_CHECKING:
     from contin.cycles.equations import PeriodicCollocation
@@ -102,6 +102,8 @@ def floquet(
     found += _by_place(system, x, tangent, errors or {}, fold)
     if trivial is not None:
         found[trivial] = abs(values[trivial])
+        double = np.abs(values) < DOUBLED  # round-off of what is 1 twice may be alike on both meshes
+        found[double] = np.maximum(found, np.abs(values))[double]
     return Floquet(cycles.whole_round(values), cycles.order * found, unstable(cycles, x[x_of]))
 
 
