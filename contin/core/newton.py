@@ -136,17 +136,23 @@ def correct(
     return _newton(system, guess, row, target, newton, sizes) if done is None else done
 
 
+def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
+    """Return x with the factors of [F_x; row] right there and the unit tangent, by a kernel; None where it does not serve."""
+    work = getattr(system, "workspace", None)
+    return None if work is None else _in_one_call(system, work, x, row, 0.0, None, linearize=True)
+
+
 def _in_one_call(
     system: Any,
     work: one_call.Workspace,
     guess: Sequence[float] | Array,
     row: Array | None,
     target: float | Array,
-    newton: Newton,
+    newton: Newton | None,
     linearize: bool = False,
     near: Factorization | None = None,
 ) -> Corrected | None:
-    """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given.
+    """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given; the guess without newton.
 
     None where Python must decide whether updates are round-off.
 
@@ -160,9 +166,10 @@ def _in_one_call(
     own = system.fill_conditions(values)
     if row is not None:
         values.rows[own], values.targets[own] = row, target
-    x, report = np.array(guess, dtype=float), np.empty(one_call.UPDATES + max(newton.max_iterations, CHORDS))
+    tolerance, most = (0.0, 0) if newton is None else (newton.tolerance, newton.max_iterations)
+    x, report = np.array(guess, dtype=float), np.zeros(one_call.UPDATES + max(most, CHORDS))
     factors = system.unfilled_factors() if near is None else near
-    tangent, control = np.empty(x.size), one_call.Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
+    tangent, control = np.empty(x.size), one_call.Control(tolerance, most, near is not None, linearize)
     done = one_call.correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
     iterations, error = int(report[one_call.ITERATIONS]), float(report[one_call.ERROR])
     if near is None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array, Numbers
+from contin.core.newton import linearized
 from contin.core.protocol import Discretization, inner
 from contin.linalg.blocks import Factors
 from contin.text import shown
@@ -39,6 +40,9 @@ class Linearization:
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
     """Return the linearization at x, its tangent with row.tangent > 0."""
+    known = linearized(system, x, row)
+    if known is not None and known.tangent is not None:
+        return Linearization(known.tangent, known.factors.sign, known.factors)
     return linearization_of(system, system.linearize(x, (row,))[1])
 
 
