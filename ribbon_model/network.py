@@ -464,16 +464,9 @@ class Network:
                     (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
                 )
         turns = [
-            (
-                number,
-                factor,
-                self._reader(self.joints[name]),
-                ends.angle_of(end := self.held[name]),
-                self._prescribing(name, end)[0],
-            )  # fmt: skip
-            for number, load in self.loads.items()
-            for name, factor in load.moments
-        ]
+            (number, factor, self._reader(self.joints[name]), ends.angle_of(end), self._prescribing(name, end)[0])
+            for number, load in self.loads.items() for name, factor in load.moments for end in (self.held[name],)
+        ]  # fmt: skip
 
         def potential(a, b, p):
             value = 0.0
@@ -543,12 +536,12 @@ class Network:
                 return point, "from the drawing"
         except ContinError as error:
             first = error
-        if is_drawn and (told := self._law_at_drawing or self._undetermined()):
+        if is_drawn and (told := self._undetermined()):
             raise ProblemError(told) from first
         try:
             drawn = self.state_near(guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
         except ContinError as error:
-            raise ProblemError(self._reason(error)) from first
+            raise ProblemError(UNDETERMINED if Undetermined.CONDITIONS in str(error) else str(error)) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
             nearest = max(way, key=lambda point: point[ASSEMBLY])
@@ -592,8 +585,11 @@ class Network:
                     )
 
     def _undetermined(self) -> str:
-        """Return what nothing determines in the drawing without stress, where no load acts; '' where all is."""
-        other, problem = self, self.problem
+        """Return what nothing determines in the drawing without stress, or which law has no value there; '' if all is well."""
+        t, other, problem = np.linspace(0, 1, 101), self, self.problem
+        for name, member in self.members.items():
+            if told := law_end.at_guess(self.sections[member.section], t, member.drawn(member.length * t)[:, :4]):
+                return f"strips: {name.partition(' ')[0]}: {told}"
         if not problem.has_index:
             loads = {name: replace(load, followers=()) for name, load in self.loads.items()}
             other = replace(self, loads=loads, numbers={name: x for name, x in self.numbers.items() if name != FOLLOWER})
@@ -754,19 +750,6 @@ class Network:
         if self.problem.has_index and not point.second_variation().is_determined:
             raise ProblemError(self._mechanism(point))
         return point
-
-    @property
-    def _law_at_drawing(self) -> str:
-        """Return that a law has no value at the drawing; '' where all have."""
-        t = np.linspace(0, 1, 101)
-        for name, member in self.members.items():
-            if told := law_end.at_guess(self.sections[member.section], t, member.drawn(member.length * t)[:, :4]):
-                return f"strips: {name.partition(' ')[0]}: {told}"
-        return ""
-
-    def _reason(self, error: ContinError) -> str:
-        """Return why no state was found, in the words of networks."""
-        return self._law_at_drawing or (UNDETERMINED if Undetermined.CONDITIONS in str(error) else str(error))
 
     @property
     def _sizes(self) -> dict[str, float]:

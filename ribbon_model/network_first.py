@@ -70,8 +70,8 @@ def _turned(network: Network, name: str, value: float, options: Mapping[str, Any
         along, line = left[:, 0], right[0] * (np.sign(np.round(left[:, 0] @ right[0], 9)) or 1.0)
         turn = np.array([1 + line @ along, *np.cross(line, along)])
     else:
-        signs = np.array([d for d in itertools.product((1, -1), repeat=3) if math.prod(d) * np.linalg.det(left @ right) > 0])
-        turns = [left * one @ right for one in signs]
+        turns = [left * np.array(signs) @ right for signs in itertools.product((1, -1), repeat=3)]
+        turns = [one for one in turns if np.linalg.det(one) > 0]
         turn = quaternions(max(turns, key=np.trace).T[None])[0]
     turn, origin = turn / np.linalg.norm(turn), network.drawn(JointEnd(next(iter(network.members))))[4:]
     frame = np.array(directors(*turn)).reshape(3, 3)

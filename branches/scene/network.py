@@ -98,10 +98,6 @@ class JointConfig(Strict):
         return self
 
 
-def _joint(value: object) -> Any:
-    return {"strips": value} if isinstance(value, list) else value
-
-
 class ForceConfig(Strict):
     """What a load does at a joint."""
 
@@ -117,10 +113,6 @@ class ForceConfig(Strict):
         if self.follows and self.force is None:
             raise ValueError("follows: a moment that follows is not there; give a force")
         return self
-
-
-def _force(value: object) -> Any:
-    return {"force": value} if isinstance(value, list) else value
 
 
 class NetworkStageConfig(FollowConfig):
@@ -140,6 +132,11 @@ class NetworkDirections(Strict):
     field: Axis = Field((0.0, 1.0, 0.0), description="of a uniform field on magnetized strips")
 
 
+def _short(field: str) -> BeforeValidator:
+    """Return what takes a list for a mapping with this field."""
+    return BeforeValidator(lambda value: {field: value} if isinstance(value, list) else value)
+
+
 class NetworkScene(StagedScene):
     """Strips that meet at joints, and the stages in which their numbers are followed."""
 
@@ -154,9 +151,9 @@ class NetworkScene(StagedScene):
     material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
     sections: dict[str, dict[str, float | int | str]] = Field(default_factory=dict, description="several of these, by name")
     strips: dict[str, StripConfig] = Field(min_length=1, max_length=200)
-    joints: dict[str, Annotated[JointConfig, BeforeValidator(_joint)]] = Field(default_factory=dict)
+    joints: dict[str, Annotated[JointConfig, _short("strips")]] = Field(default_factory=dict)
     held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints; nothing: the network floats")
-    loads: dict[str, dict[str, Annotated[ForceConfig, BeforeValidator(_force)]]] = Field(default_factory=dict)
+    loads: dict[str, dict[str, Annotated[ForceConfig, _short("force")]]] = Field(default_factory=dict)
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: NetworkDirections = NetworkDirections()
     magnetized: Literal["width", "normal", "tangent"] = "tangent"
@@ -371,7 +368,7 @@ class NetworkScene(StagedScene):
     @functools.cached_property
     def longest(self) -> float:
         """The length of the longest strip."""
-        return max(member.length for member in self._drawn.values())
+        return self.strip().longest
 
     @property
     def law_name(self) -> str:

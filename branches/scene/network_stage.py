@@ -19,6 +19,14 @@ from ribbon_model.network_first import first_state
 
 #: Axes of the drawing.
 _AXES = "xyz"
+#: Words of columns, and those of axes.
+_WORDS = {
+    FOLLOWER: ("pressure that stays normal to the strips, per length", "pressure that follows"),
+    ASSEMBLY: ("part of natural strains, loads, gaps and turns of joints that acts", "assembly"),
+    "floating": ("largest reaction to what holds the network that floats: an error", "reaction of what floats"),
+    "potential": ("energy and the potential of all loads: the one of which the index is", "potential"),
+    "energy": ("elastic energy, zero in the natural state, and potential of weight, pressure and field", "energy"),
+}
 
 
 class NetworkStage(OpenStage):
@@ -139,16 +147,8 @@ class NetworkStage(OpenStage):
             return f"{what}, once its support has changed", what.removeprefix("dead ")
         if name in network.loads:
             return f"number of the load {name}", name
-        if name == FOLLOWER:
-            return "pressure that stays normal to the strips, per length", "pressure that follows"
-        if name == ASSEMBLY:
-            return "part of natural strains, loads, gaps and turns of joints that acts", "assembly"
-        if name == "floating":
-            return "largest reaction to what holds the network that floats: an error", "reaction of what floats"
-        if name == "potential":
-            return "energy and the potential of all loads: the one of which the index is", "potential"
-        if name == "energy":
-            return "elastic energy, zero in the natural state, and potential of weight, pressure and field", "energy"
+        if name in _WORDS:
+            return _WORDS[name]
         if found := re.fullmatch(r"([FM])_(\w+)_([xyz])", name):
             kind = "force" if found[1] == "F" else "moment"
             return f"{kind} on the network at {found[2]}, along {found[3]}", f"{kind} at {found[2]} along {found[3]}"
