@@ -641,7 +641,8 @@ class Network:
             at = [(where, np.array(f), self.joints[where].members[0], arm) for where, f, arm in self.loads[name].forces]
             return sum(np.outer(f, self.place(point, where) + self._arm(point, one, arm)) for where, f, one, arm in at)
         lengths = [member.length for member in self.members.values()]
-        axes = [shape.directors[:, self.magnetized].mean(axis=0) for shape in self.shapes(point).values()]
+        states = point.system.evaluate(point.x, np.linspace(0, 1, 101))
+        axes = [np.mean([_axes(row[at])[self.magnetized] for row in states], axis=0) for at in self.places]
         return np.outer(self.field_direction, np.average(axes, axis=0, weights=lengths) * sum(lengths))
 
     @property

@@ -189,6 +189,25 @@ def test_shipped_networks_are_the_same_however_they_are_drawn(name, change, tmp_
     _compare(_shipped(name), change, tmp_path)
 
 
+#: Two strips that float, at first without loads; a pair of forces, or three in a plane.
+FLOATS = """
+material: {law: rod, B1: 1, B2: 4, C: 0.8, kappa_n: 0.5}
+strips:
+  a: {begin: [0, 0, 0], end: [0.5, 0.3, 1], normal: [0, 1, 0]}
+  b: {begin: [0.5, 0.3, 1], end: [1.2, 0.3, 1.4], normal: [0, 1, 0]}
+joints: {A: [a start], B: [b finish], C: [a finish, b start]}
+"""
+FORCES = [{"A": [0, 0, -1], "B": [0, 0, 1]}, {"A": [0, 0, 1], "B": [0.3, 0, 0], "C": [-0.3, 0, -1]}]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("load", [{"loads": {"P": forces}} for forces in FORCES] + [{"magnetized": "normal"}])
+def test_networks_that_float_are_the_same_however_they_are_drawn(load, tmp_path):
+    _compare(
+        yaml.safe_load(FLOATS) | load | {"stages": [{"follow": "P" if "loads" in load else "field", "to": 2}]}, "all", tmp_path
+    )
+
+
 def _random(seed: int) -> dict:
     """Strips in a row, a ring or a tree, with joints of all kinds, supports and a load in any direction."""
     rng = np.random.default_rng(seed)
