@@ -11,6 +11,7 @@ from contin.core.spectral import Spectral, changes
 from contin.core.trial import Trial
 from contin.errors import ProblemError
 from contin.events.error import error
+from contin.levels import ROUND_OFF
 from contin.linalg.matrices import eigenvalues
 
 
@@ -50,7 +51,9 @@ class Spectrum:
             )
         self.values: ComplexArray = _values(Trial.without_tangent(point.system, point.x))
         self.errors: Array = error(point, _values, _apart)
-        if not system.intervals:
+        if system.intervals:  # they come from solutions of linear equations
+            self.errors = self.errors + ROUND_OFF * (1 + np.abs(self.values))
+        else:
             x = point.x[: system.size]
             self.errors = self.errors + (np.nan if system.is_sparse else changes(_rounded(system.jacobian(x)), self.values))
         self.unstable = int(np.count_nonzero(self.values.real > 0))

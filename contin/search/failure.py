@@ -300,6 +300,15 @@ def dependence(system: System, x: Array) -> str:
     return _jumping(system, rank) or _conditions(system, z, rank, solved)
 
 
+def of_family(system: System, x: Array) -> str:
+    """Return why the equations of an orbit are singular at a guess, where its solutions form a family, as a sentence; or "".
+
+    Newton's method would choose one of them by round-off, or lead to an equilibrium.
+    """
+    rank = _rank(system, x) if isinstance(system.problem, (CycleProblem, ConnectionProblem)) else None
+    return _of_orbit(system, x) if rank is not None and rank.null.size else ""
+
+
 def _of_orbit(system: System, x: Array) -> str:
     """Return why a cycle or connecting orbit near x is not determined, as a sentence; or ""."""
     idle = [name for name in system.free if not system.parameter_columns(x, (name,)).any()]

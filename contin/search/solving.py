@@ -31,7 +31,7 @@ from contin.problems.angles import winding_names
 from contin.problems.statement import declared, forget_changed, with_multipliers
 from contin.results.point import Point, point_of, underlying
 from contin.results.record import system_of
-from contin.search.failure import dependence, doubtful, label_of, looked_at, not_finite_near, recovered
+from contin.search.failure import dependence, doubtful, label_of, looked_at, not_finite_near, of_family, recovered
 from contin.search.guess import Guess, Options, first_guess, restated
 from contin.text import exact_text
 
@@ -186,6 +186,8 @@ def solved(
     def corrected(system: System, x: Array) -> Corrected:
         return _corrected(system, x, others, newton, explains) if held is None else _holding(system, x, held, newton)
 
+    if explains and not others and held is None and (why := of_family(system, x)):
+        raise ProblemError(why)
     for _ in range(ROUNDS_OF_MESHES):
         done = corrected(system, x)
         if control.every:
