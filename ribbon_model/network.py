@@ -27,35 +27,13 @@ from typing import Any
 
 import numpy as np
 
-from contin import (
-    ContinError,
-    Event,
-    MeshControl,
-    Point,
-    ProblemError,
-    SegmentedVariationalProblem,
-    VariationalSegment,
-    solve,
-    trace,
-)
+import contin
+from contin import ContinError, Point, ProblemError, solve, trace
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
-from ribbon_model.members import (
-    BALL,
-    FINISH,
-    HINGE,
-    RIGID,
-    START,
-    Joint,
-    JointEnd,
-    Load,
-    Member,
-    Quaternion,
-    numbers_of,
-    straight,
-)
+from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, numbers_of, straight
 from ribbon_model.outlines import fans
 from ribbon_model.phases import Phase, phase_along
 from ribbon_model.section import NATURAL, Section
@@ -81,7 +59,7 @@ UNDETERMINED = (
     "places that are held cannot lengthen); draw a strip with a bend, or hold less"
 )
 #: The mesh of first states: a coarse one has solutions that are none.
-_MESH = MeshControl(1e-9, max_intervals=200)
+_MESH = contin.MeshControl(1e-9, max_intervals=200)
 #: Most points of the way from the drawing without stress. Where a gap cannot close, forces grow without end: 60 points of a
 #: portal took 9 s, 200 more than two minutes.
 _MOST = 60
@@ -143,7 +121,7 @@ class Network:
     >>> joints = {"P": Joint([JointEnd("a", FINISH), JointEnd("b")]), "Q": Joint([JointEnd("b", FINISH), JointEnd("a")])}
     >>> ring = Network({"strip": rod}, {"a": half, "b": other}, joints, numbers={"pressure": 0.0})
     >>> circle, how = ring.first_point()
-    >>> branch = contin.trace(circle, free=["pressure"], limits={"pressure": (0, 4)})
+    >>> branch = trace(circle, free=["pressure"], limits={"pressure": (0, 4)})
     >>> [(round(point["pressure"], 9), point.index_change) for point in branch.labelled("BP")]
     [(3.0, (0, 2))]
     """
@@ -286,7 +264,7 @@ class Network:
     # --- the problem --------------------------------------------------------------------------------------------------
 
     @functools.cached_property
-    def problem(self) -> SegmentedVariationalProblem:
+    def problem(self) -> contin.SegmentedVariationalProblem:
         """The variational problem; its segments are the members, in their order.
 
         Raises
@@ -304,8 +282,8 @@ class Network:
                 densities[key] = self._hamiltonian(member, place)
             states = (*FRAME, *CENTRELINE, *phases)
             work = _following_pressure if FOLLOWER in self.numbers else None
-            segments.append(VariationalSegment(None, states, member.length, hamiltonian=densities[key], work=work))
-        return SegmentedVariationalProblem(
+            segments.append(contin.VariationalSegment(None, states, member.length, hamiltonian=densities[key], work=work))
+        return contin.SegmentedVariationalProblem(
             segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
             phases=self._named(phases), end_work=self._end_work(),
         )  # fmt: skip
@@ -785,7 +763,7 @@ class Network:
 
     # --- where laws end -----------------------------------------------------------------------------------------------
 
-    def _ends(self) -> list[tuple[Section, list[Event]]]:
+    def _ends(self) -> list[tuple[Section, list[contin.Event]]]:
         """Return the section of each member, with the test function that ends a run where its law ends."""
         found = []
         for (name, member), places in zip(self.members.items(), self.places):
@@ -798,7 +776,7 @@ class Network:
     def _strains_of(self, name: str, system: Collocation, x: np.ndarray) -> np.ndarray:
         return self.strains(system, x)[name]
 
-    def domain_tests(self) -> list[Event]:
+    def domain_tests(self) -> list[contin.Event]:
         """Return the test functions that end a run where a law ends; none for laws that are regular everywhere."""
         return [test for _, tests in self._ends() for test in tests]
 
@@ -923,12 +901,12 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
     return [ends.along(vector, turned) for vector in ends.perpendicular(ends.unit("axis", axis))]
 
 
-def _from_drawing(q, drawn: Quaternion) -> tuple:
+def _from_drawing(q, drawn: tuple) -> tuple:
     """Return q conj(q0) of an end that is drawn with the quaternion q0."""
     return product(q, (drawn[0], *(-x for x in drawn[1:])))
 
 
-def _joint_frame(q, drawn: Quaternion, each: JointEnd, p) -> tuple:
+def _joint_frame(q, drawn: tuple, each: JointEnd, p) -> tuple:
     """Return J, the same less the angle by which the end is turned before it is joined."""
     frame = _from_drawing(q, drawn)
     if each.angle == 0:

@@ -19,18 +19,10 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array, Function
+from contin.boundary import statement
 from contin.boundary.canonical import Canonical, EndConditions, Variation, canonical
 from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, second_variation, stability_of
-from contin.boundary.statement import (
-    BoundaryValueProblem,
-    InSegments,
-    Piece,
-    Quantity,
-    between,
-    joint_names,
-    side_by_side,
-    sums,
-)  # fmt: skip
+from contin.boundary.statement import BoundaryValueProblem, InSegments, Piece, Quantity, between, joint_names
 from contin.boundary.system import Collocation
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
@@ -432,9 +424,9 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
         with_multipliers = [each.with_multipliers(len(names)) for each in pieces]
         columns = [{name: _of(f, count) for name, f in each.canonical.functionals.items()} for each in own]
         derived = Canonical(
-            side_by_side([_of(each.canonical.rhs, count) for each in own], with_multipliers), at_ends.function(), None,
-            sums(columns, with_multipliers), _pivots([each.canonical.legendre for each in own], with_multipliers, count),
-            at_ends.sigmas, at_ends.fixed,
+            statement.side_by_side([_of(each.canonical.rhs, count) for each in own], with_multipliers),
+            at_ends.function(), None, statement.sums(columns, with_multipliers),
+            _pivots([each.canonical.legendre for each in own], with_multipliers, count), at_ends.sigmas, at_ends.fixed,
         )  # fmt: skip
         self._keep(segments=given, pieces=with_multipliers)
         phases = [f"lam_{name}" for name in checks.chosen("phases", phases, names)]

@@ -11,18 +11,8 @@ from typing import NamedTuple
 
 from contin.continuation import rules
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.core.small import (
-    BELIEVED,
-    ERROR,
-    FAILED,
-    SIGN,
-    UPDATES,
-    Equations,
-    Linear,
-    correct_point,
-    evaluate_slopes,
-    fill_matrix,
-)  # fmt: skip
+from contin.core import small
+from contin.core.small import Equations, Linear
 from contin.core.system import USUAL
 from contin.events.arc import LEAST_COSINE
 from contin.events.crossings import CALM, NEAR_ONE
@@ -65,11 +55,11 @@ def _attempted(rooms: Rooms, path: Path, number: int, bend: float, step: float) 
     rules.predict(attempt, path, number, bend, step)
     for i in range(x.size):
         target += linear.row[i] * x[i]
-    outcome: int = correct_point(equations, linear, control.tolerance, control.most, new, target, path.tangents[number])
-    if outcome != BELIEVED:
+    outcome: int = small.correct_point(equations, linear, control.tolerance, control.most, new, target, path.tangents[number])
+    if outcome != small.BELIEVED:
         return outcome
     judged, found = attempt.judged, linear.found
-    judged[rules.SIGN], judged[rules.UPDATES], judged[rules.ERROR] = found[SIGN], found[UPDATES], found[ERROR]
+    judged[rules.SIGN], judged[rules.UPDATES], judged[rules.ERROR] = found[small.SIGN], found[small.UPDATES], found[small.ERROR]
     return rules.judge(frame, attempt, control, path, number, bend, step)
 
 
@@ -84,10 +74,10 @@ def _made(rooms: Rooms, path: Path, number: int, bend: float) -> float:
     step = rules.first_length(rooms.frame, rooms.control, rooms.watch, path, number, bend)
     while True:
         outcome = _attempted(rooms, path, number, bend, step)
-        if outcome == BELIEVED:
+        if outcome == small.BELIEVED:
             return step
         step /= 2
-        if outcome != FAILED or step < rooms.control.shortest:
+        if outcome != small.FAILED or step < rooms.control.shortest:
             return 0.0
 
 
@@ -138,8 +128,8 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int, bent: int) -> int:
     ``accepted`` is the number of regular points up to row 1, ``bent`` 1 where row 0 has a tangent.
     """
     equations, linear, frame, attempt, control, watch, quotient, spectra = rooms
-    evaluate_slopes(equations, path.x[1])
-    fill_matrix(equations, path.tangents[1], linear.matrix)
+    small.evaluate_slopes(equations, path.x[1])
+    small.fill_matrix(equations, path.tangents[1], linear.matrix)
     if watch.eigenvalues and fill_spectrum(equations, spectra, LAST):
         return 0
     rows: int = path.x.shape[0]

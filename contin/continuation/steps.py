@@ -9,20 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
+from contin.core import step as core_step
 from contin.core.settings import Settings
-from contin.core.step import (
-    ASTRAY,
-    Judgement,
-    State,
-    aims,
-    corrected,
-    following_step,
-    is_astray,
-    judged,
-    longest_step,
-    predict,
-    settled,
-)  # fmt: skip
+from contin.core.step import Judgement, State, aims, corrected, following_step, judged, predict
 from contin.core.trial import Event, Trial, same_sign
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -95,7 +84,7 @@ class Steps:
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
         angle, accuracy = aims(settings, state.system)
-        if not (judgement.turn <= angle and judgement.missed <= ASTRAY * accuracy * step):
+        if not (judgement.turn <= angle and judgement.missed <= core_step.ASTRAY * accuracy * step):
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
@@ -105,7 +94,7 @@ class Steps:
         low, before = self._aside(state, step) if state.singular else (0.0, here)
         self._stay_off_trivial(state, before, trial)
         if settings.mesh.every:
-            trial = settled(trial, state.tangent, settings.newton)
+            trial = core_step.settled(trial, state.tangent, settings.newton)
         return Arc(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
 
     def accepted(self, arc: Arc, judgement: Judgement, turned: bool) -> State:
@@ -119,7 +108,7 @@ class Steps:
         order, longest = 2 if state.previous_tangent is None else 3, settings.max_step
         free = slice(state.system.state_size, None)
         for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
-            longest = longest_step(longest, settings.change, value, rate)
+            longest = core_step.longest_step(longest, settings.change, value, rate)
         following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)
         way = self.sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
@@ -171,7 +160,7 @@ class Steps:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        return bool(is_astray(missed, change, trial.newton_error, trial.x[at]) and self.sense(trial))
+        return bool(core_step.is_astray(missed, change, trial.newton_error, trial.x[at]) and self.sense(trial))
 
     def _has_moved(self, start: Array, trial: Trial) -> bool:
         """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""

@@ -20,26 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array
+from contin.functions import kernel_parts as parts
 from contin.functions import round_off
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import (
-    Builder,
-    IndexMatrix,
-    IndexVector,
-    Matrix,
-    Stack,
-    Type,
-    Value,
-    Vector,
-    constant,
-    double,
-    for_range,
-    helper,
-    instruction,
-    llvm,
-    variable,
-    whole,
-)  # fmt: skip
+from contin.functions.kernel_parts import Builder, IndexMatrix, IndexVector, Matrix, Stack, Value, Vector, helper, instruction
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, TIME, Inputs, Program, program
 from contin.functions.tape import Tape
@@ -99,8 +83,8 @@ class _Writer:
     def entry(self, base: Value, number: Value) -> Value:
         return self.builder.add(base, self.builder.mul(number, _number(8)))
 
-    def load(self, address: Value, kind: Type | None = None) -> Value:
-        value = self.builder.load(self.builder.inttoptr(address, (kind or double()).as_pointer()))
+    def load(self, address: Value, kind: parts.Type | None = None) -> Value:
+        value = self.builder.load(self.builder.inttoptr(address, (kind or parts.double()).as_pointer()))
         value.align = 8
         return value
 
@@ -111,16 +95,17 @@ class _Writer:
         return self.load(self.entry(self.memory.scalars, number))
 
     def splat(self, value: Value) -> Value:
-        none = constant(_group(), llvm().Undefined)
-        first = self.builder.insert_element(none, value, constant(whole(32), 0))
-        return self.builder.shuffle_vector(first, none, constant(llvm().VectorType(whole(32), GROUP), [0] * GROUP))
+        none = parts.constant(_group(), parts.llvm().Undefined)
+        first = self.builder.insert_element(none, value, parts.constant(parts.whole(32), 0))
+        everywhere = parts.constant(parts.llvm().VectorType(parts.whole(32), GROUP), [0] * GROUP)
+        return self.builder.shuffle_vector(first, none, everywhere)
 
     def vector(self, value: Callable[..., Value], operands: list[Value], scalars: list[Value]) -> None:
         """d = value(operands, scalars), eight lanes at a time; scalars are the same in all."""
         builder = self.builder
         target, sources = self.register(self.d), [self.register(operand) for operand in operands]
         wide = [self.splat(self.scalar(number)) for number in scalars]
-        with for_range(builder, self.groups) as loop:
+        with parts.for_range(builder, self.groups) as loop:
             offset = builder.mul(loop.index, _number(_BYTES))
             values = [self.load(builder.add(source, offset), _group()) for source in sources]
             self.store(value(*values, *wide), builder.add(target, offset))
@@ -129,7 +114,7 @@ class _Writer:
         """d = value(operands), lane by lane."""
         builder = self.builder
         target, sources = self.register(self.d), [self.register(operand) for operand in operands]
-        with for_range(builder, self.lanes) as loop:
+        with parts.for_range(builder, self.lanes) as loop:
             values = [self.load(self.entry(source, loop.index)) for source in sources]
             self.store(value(*values), self.entry(target, loop.index))
 
@@ -137,7 +122,7 @@ class _Writer:
         """d = a column of an array, point by point."""
         builder = self.builder
         target = self.register(self.d)
-        with for_range(builder, self.lanes) as loop:
+        with parts.for_range(builder, self.lanes) as loop:
             self.store(self.load(builder.add(base, builder.mul(loop.index, width))), self.entry(target, loop.index))
 
     def scatter(self, base: Value, width: Value, scalar: bool) -> None:
@@ -146,7 +131,7 @@ class _Writer:
         base = self.entry(base, self.d)
         value = self.scalar(self.a) if scalar else None
         source = None if scalar else self.register(self.a)
-        with for_range(builder, self.lanes) as loop:
+        with parts.for_range(builder, self.lanes) as loop:
             found = value if scalar else self.load(self.entry(source, loop.index))
             self.store(found, builder.add(base, builder.mul(loop.index, width)))
 
@@ -154,36 +139,36 @@ class _Writer:
         """d = sum of b terms; ``term(number, offset)`` returns one of them, for eight lanes."""
         builder = self.builder
         target = self.register(self.d)
-        with for_range(builder, self.groups) as outer:
+        with parts.for_range(builder, self.groups) as outer:
             offset = builder.mul(outer.index, _number(_BYTES))
-            total = variable(builder, term(_number(0), offset))
-            with for_range(builder, builder.sub(self.b, _number(1))) as inner:
+            total = parts.variable(builder, term(_number(0), offset))
+            with parts.for_range(builder, builder.sub(self.b, _number(1))) as inner:
                 following = term(builder.add(inner.index, _number(1)), offset)
                 builder.store(builder.fadd(builder.load(total), following), total)
             self.store(builder.load(total), builder.add(target, offset))
 
     def listed(self, number: Value) -> Value:
         """Return a number of the list that begins at a."""
-        return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), whole())
+        return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), parts.whole())
 
     def lane(self, register: Value, offset: Value) -> Value:
         """Return eight lanes of a register."""
         return self.load(self.builder.add(self.register(register), offset), _group())
 
 
-def _group() -> Type:
+def _group() -> parts.Type:
     """Return LLVM's type of a group."""
-    return llvm().VectorType(double(), GROUP)
+    return parts.llvm().VectorType(parts.double(), GROUP)
 
 
 def _number(value: int) -> Value:
-    return constant(whole(), value)
+    return parts.constant(parts.whole(), value)
 
 
 def _intrinsic(builder: Builder, name: str) -> Callable[[Value], Value]:
     full = f"llvm.{name}.v{GROUP}f64"
-    kind = llvm().FunctionType(_group(), [_group()])
-    function = builder.module.globals.get(full) or llvm().Function(builder.module, kind, full)
+    kind = parts.llvm().FunctionType(_group(), [_group()])
+    function = builder.module.globals.get(full) or parts.llvm().Function(builder.module, kind, full)
     return lambda x: builder.call(function, [x])
 
 
@@ -192,11 +177,11 @@ def _truth(builder: Builder, condition: Value) -> Value:
 
 
 def _zeros() -> Value:
-    return constant(_group(), [0.0] * GROUP)
+    return parts.constant(_group(), [0.0] * GROUP)
 
 
 def _sign(builder: Builder, x: Value) -> Value:
-    one, minus = (constant(_group(), [value] * GROUP) for value in (1.0, -1.0))
+    one, minus = (parts.constant(_group(), [value] * GROUP) for value in (1.0, -1.0))
     below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
     return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
 
@@ -232,15 +217,15 @@ def _arithmetic(builder: Builder) -> dict[str, tuple[Callable[..., Value], int, 
 def _library(builder: Builder, name: str) -> tuple[Callable[..., Value], int]:
     """Return the value of a function of the C library for one lane, and the number of its operands."""
     external, count = TABLE[name].external, 2 if name in OF_TWO else 1
-    kind = llvm().FunctionType(double(), [double()] * count)
-    function = builder.module.globals.get(external) or llvm().Function(builder.module, kind, external)
+    kind = parts.llvm().FunctionType(parts.double(), [parts.double()] * count)
+    function = builder.module.globals.get(external) or parts.llvm().Function(builder.module, kind, external)
 
     def value(*given: Value) -> Value:
         found = builder.call(function, given)
         if name != "mod":
             return found
         x, y = found, given[1]  # C's remainder has the sign of the dividend, Python's that of the divisor
-        other = builder.fcmp_ordered("<", builder.fmul(x, y), constant(double(), 0.0))
+        other = builder.fcmp_ordered("<", builder.fmul(x, y), parts.constant(parts.double(), 0.0))
         return builder.select(other, builder.fadd(x, y), x)
 
     return value, count
@@ -296,7 +281,7 @@ def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
 def interpret(builder: Builder, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
     """Run the instructions from ``first`` to ``last``; return the number of one that is none of these, or ``last``."""
     write = _Writer(builder, memory, widths, lanes)
-    place = variable(builder, first)
+    place = parts.variable(builder, first)
     head, body, end = (builder.append_basic_block() for _ in range(3))
     builder.branch(head)
     builder.position_at_end(head)
@@ -305,7 +290,7 @@ def interpret(builder: Builder, memory: Memory, widths: Widths, lanes: int, firs
     builder.position_at_end(body)
     row = builder.add(memory.code, builder.mul(now, _number(_ROW)))
     code, write.d, write.a, write.b, write.c = (
-        write.load(builder.add(row, _number(8 * column)), whole()) for column in range(5)
+        write.load(builder.add(row, _number(8 * column)), parts.whole()) for column in range(5)
     )
     following = builder.append_basic_block()
     choice = builder.switch(code, end)
@@ -565,12 +550,12 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 @instruction
 def _bits(builder: Builder, value: float) -> int:
-    return builder.bitcast(value, whole())
+    return builder.bitcast(value, parts.whole())
 
 
 @instruction
 def _number_of(builder: Builder, bits: int) -> float:
-    return builder.bitcast(bits, double())
+    return builder.bitcast(bits, parts.double())
 
 
 @helper

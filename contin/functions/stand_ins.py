@@ -20,23 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from contin.functions import recorded_arrays
 from contin.functions.interpreter import of_columns
 from contin.functions.primitives import TABLE
-from contin.functions.recorded_arrays import (
-    FUNCTIONS,
-    NUMPY,
-    UFUNCS,
-    Numbers,
-    SparseConstant,
-    elementwise,
-    largest,
-    numbers,
-    operation,
-    recorded,
-    scalar_product,
-    smallest,
-    tabulated,
-)  # fmt: skip
+from contin.functions.recorded_arrays import FUNCTIONS, UFUNCS, largest, numbers, operation, recorded, scalar_product, smallest
 from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex
 from contin.functions.signature import Arguments
 from contin.functions.tape import Number, Table, Tape, Unrecordable
@@ -112,7 +99,7 @@ class RecordedFunction:
 
     def compact(self) -> RecordedFunction:
         """Return the same function on a tape of its own, which has what it needs and nothing else."""
-        tape = Tape(NUMPY)
+        tape = Tape(recorded_arrays.NUMPY)
         inputs = {place: tape.input(self._tape.operations[place].data) for place in self._inputs}
         results = [number.place for number in tape.replay(self._tape, self._results, inputs)]
         places = [inputs[place].place for place in self._inputs]
@@ -206,7 +193,7 @@ class _Copies:
 
     def value(self, value: object) -> Any:
         """Return what stands for a value."""
-        if isinstance(value, (Number, ComplexNumber, Numbers, RecordedFunction, _Module, _Object)):
+        if isinstance(value, (Number, ComplexNumber, recorded_arrays.Numbers, RecordedFunction, _Module, _Object)):
             return value
         own = _own(value)
         if own is not None:
@@ -320,7 +307,7 @@ def _own(value: object) -> Any:
     """Return the stand-in of a function, sparse matrix or spline; None of everything else."""
     if isinstance(value, np.ufunc):
         function = UFUNCS.get(value.__name__)
-        return None if function is None else _Either(value, functools.partial(elementwise, function))
+        return None if function is None else _Either(value, functools.partial(recorded_arrays.elementwise, function))
     if type(value).__module__.startswith("scipy."):
         return _of_scipy(value)
     try:
@@ -332,18 +319,18 @@ def _own(value: object) -> Any:
 def _of_scipy(value: Any) -> Any:
     """Return the stand-in of a sparse matrix, or of a spline."""
     if hasattr(value, "tocsr"):
-        return SparseConstant(value)
+        return recorded_arrays.SparseConstant(value)
     kind, extrapolates = type(value).__name__, getattr(value, "extrapolate", False) is True
     if kind in ("CubicSpline", "PPoly", "PchipInterpolator", "Akima1DInterpolator", "CubicHermiteSpline"):
         if np.ndim(value.c) == 2 and extrapolates:
-            return _Either(value, tabulated(Table.piecewise(value.x, value.c)))
+            return _Either(value, recorded_arrays.tabulated(Table.piecewise(value.x, value.c)))
     elif kind == "BSpline" and np.ndim(value.c) == 1 and extrapolates:
         from scipy.interpolate import PPoly  # type: ignore[import-untyped]
 
         pieces = PPoly.from_spline(value)
         inside = [i for i, (a, b) in enumerate(zip(pieces.x, pieces.x[1:])) if b > a]
         knots = [*(pieces.x[i] for i in inside), pieces.x[inside[-1] + 1]]
-        return _Either(value, tabulated(Table.piecewise(knots, pieces.c[:, inside])))
+        return _Either(value, recorded_arrays.tabulated(Table.piecewise(knots, pieces.c[:, inside])))
     return None
 
 

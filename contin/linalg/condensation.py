@@ -31,30 +31,11 @@ import numpy as np
 from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyMatrix, Stack, helper
+from contin.linalg import vector
 from contin.linalg.blocks import ALL, Blocks, Layout, Share, is_large, run, share
 from contin.linalg.elimination import Eliminated, Range, factorize, group_step, point_step, whole_step
 from contin.linalg.ends import Relations, relations_of
-from contin.linalg.vector import (
-    LANES,
-    PANEL,
-    add,
-    address,
-    apart,
-    apply_lower,
-    apply_lower_transposed,
-    apply_upper,
-    apply_upper_transposed,
-    at,
-    clear,
-    entry,
-    exchange,
-    move,
-    page,
-    side_by_side,
-    subtract_columns,
-    subtract_rows,
-    within,
-)  # fmt: skip
+from contin.linalg.vector import LANES, PANEL, at, entry, page, within
 
 
 class Vectors(NamedTuple):
@@ -134,35 +115,35 @@ def _vectors(work, sizes, part, s):
 def _move(target, source, count):
     """Copy ``count`` entries."""
     for k in range(count):
-        move(entry(target, k), entry(source, k))
+        vector.move(entry(target, k), entry(source, k))
 
 
 @helper
 def _clear(target, count):
     """Fill ``count`` entries with zeros."""
     for k in range(count):
-        clear(entry(target, k))
+        vector.clear(entry(target, k))
 
 
 @helper
 def _add(target, source, count):
     """Add ``count`` entries."""
     for k in range(count):
-        add(entry(target, k), entry(source, k))
+        vector.add(entry(target, k), entry(source, k))
 
 
 @helper
 def _take(target, source, places, part):
     """Fill entries of ``target`` with source[places[part]]."""
     for k in range(part.first, part.last):
-        move(entry(target, k - part.first), entry(source, places[k]))
+        vector.move(entry(target, k - part.first), entry(source, places[k]))
 
 
 @helper
 def _put(target, places, part, source):
     """Put entries of ``source`` at target[places[part]]."""
     for k in range(part.first, part.last):
-        move(entry(target, places[k]), entry(source, k - part.first))
+        vector.move(entry(target, places[k]), entry(source, k - part.first))
 
 
 # --- substitution with the rows and columns of one elimination -------------------------------------------------------
@@ -174,20 +155,20 @@ def _forward(block, step, pivots, x):
     top, bottom, left, right, _, _ = step
     for c in range(left, right):
         if pivots[c] != top + c - left:
-            exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
+            vector.exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
     for start in range(left, right, PANEL):
         size, row = min(PANEL, right - start), top + start - left
-        subtract_rows(entry(x, row), within(block, row, left), entry(x, top), start - left, size)
-        apply_lower(entry(x, row), within(block, row, start), size)
+        vector.subtract_rows(entry(x, row), within(block, row, left), entry(x, top), start - left, size)
+        vector.apply_lower(entry(x, row), within(block, row, start), size)
     row = top + right - left
-    subtract_rows(entry(x, row), within(block, row, left), entry(x, top), right - left, bottom - row)
+    vector.subtract_rows(entry(x, row), within(block, row, left), entry(x, top), right - left, bottom - row)
 
 
 @helper(inline=True)
 def _subtract(matrix, rows, step, x, y):
     """Apply an elimination to the right-hand sides y of reduced ``rows`` of a matrix; x are those of the block."""
     reduced, pivots = within(matrix, rows.first, step.left), entry(x, step.top)
-    subtract_rows(entry(y, rows.first), reduced, pivots, step.right - step.left, rows.last - rows.first)
+    vector.subtract_rows(entry(y, rows.first), reduced, pivots, step.right - step.left, rows.last - rows.first)
 
 
 @helper
@@ -195,13 +176,13 @@ def _backward(block, step, x, known):
     """Solve the upper triangle of an elimination for x; ``known`` are the unknowns of the columns from the tail on."""
     top, _, left, right, tail, width = step
     if width > tail:
-        subtract_rows(entry(x, top), within(block, top, tail), known, width - tail, right - left)
+        vector.subtract_rows(entry(x, top), within(block, top, tail), known, width - tail, right - left)
     end = right
     while end > left:
         start = left + (end - left - 1) // PANEL * PANEL
         row, after = top + start - left, top + end - left
-        subtract_rows(entry(x, row), within(block, row, end), entry(x, after), right - end, end - start)
-        apply_upper(entry(x, row), within(block, row, start), end - start)
+        vector.subtract_rows(entry(x, row), within(block, row, end), entry(x, after), right - end, end - start)
+        vector.apply_upper(entry(x, row), within(block, row, start), end - start)
         end = start
 
 
@@ -212,17 +193,17 @@ def _forward_transposed(block, step, x, rest):
     for start in range(left, right, PANEL):
         end, row = min(start + PANEL, right), top + start - left
         size, after = end - start, top + end - left
-        apply_upper_transposed(entry(x, row), within(block, row, start), size)
-        subtract_columns(entry(x, after), within(block, row, end), entry(x, row), right - end, size)
+        vector.apply_upper_transposed(entry(x, row), within(block, row, start), size)
+        vector.subtract_columns(entry(x, after), within(block, row, end), entry(x, row), right - end, size)
         if width > tail:
-            subtract_columns(rest, within(block, row, tail), entry(x, row), width - tail, size)
+            vector.subtract_columns(rest, within(block, row, tail), entry(x, row), width - tail, size)
 
 
 @helper(inline=True)
 def _subtract_transposed(matrix, rows, step, y, x):
     """Subtract from x what the multipliers y of reduced ``rows`` of a matrix contribute to those of the block."""
     reduced, pivots = within(matrix, rows.first, step.left), entry(x, step.top)
-    subtract_columns(pivots, reduced, entry(y, rows.first), step.right - step.left, rows.last - rows.first)
+    vector.subtract_columns(pivots, reduced, entry(y, rows.first), step.right - step.left, rows.last - rows.first)
 
 
 @helper
@@ -230,17 +211,17 @@ def _backward_transposed(block, step, pivots, x):
     """Apply the transpose of an elimination to the multipliers x of the rows of a block."""
     top, bottom, left, right, _, _ = step
     row = top + right - left
-    subtract_columns(entry(x, top), within(block, row, left), entry(x, row), right - left, bottom - row)
+    vector.subtract_columns(entry(x, top), within(block, row, left), entry(x, row), right - left, bottom - row)
     end = right
     while end > left:
         start = left + (end - left - 1) // PANEL * PANEL
         row = top + start - left
-        apply_lower_transposed(entry(x, row), within(block, row, start), end - start)
-        subtract_columns(entry(x, top), within(block, row, left), entry(x, row), start - left, end - start)
+        vector.apply_lower_transposed(entry(x, row), within(block, row, start), end - start)
+        vector.subtract_columns(entry(x, top), within(block, row, left), entry(x, row), start - left, end - start)
         end = start
     for c in range(right - 1, left - 1, -1):
         if pivots[c] != top + c - left:
-            exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
+            vector.exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
 
 
 # --- solve: the stages, one after the other, and unknowns in the reverse order ---------------------------------------
@@ -344,7 +325,7 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
     The stages of a `Share` are: elimination in segments, what joins them, substitution in segments. A share that is not the
     whole takes at most `LANES` rows.
     """
-    starts, place = share.starts, address(work, 0)
+    starts, place = share.starts, vector.address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
     _, rows, n, r, k = sizes
     collocation, tail = factors.local.shape[0] * rows, n + k
@@ -355,9 +336,9 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
-                side_by_side(vectors.given, within(given, 0, part.first * rows), (part.last - part.first) * rows, count)
+                vector.side_by_side(vectors.given, within(given, 0, part.first * rows), (part.last - part.first) * rows, count)
                 if s == 0:
-                    side_by_side(joint.rest, within(given, 0, collocation), tail, count)
+                    vector.side_by_side(joint.rest, within(given, 0, collocation), tail, count)
                     _move(vectors.border, entry(joint.rest, tail - r), r)
                 else:
                     _clear(vectors.border, r)
@@ -365,14 +346,14 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
                 _forward_points(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
             _solve_joint(factors, sizes, starts, place)
-            apart(within(found, 0, collocation), joint.rest, tail, count)
+            vector.apart(within(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 _backward_points(factors, n, part, vectors)
                 _backward_interiors(layout, factors, part, vectors)
-                apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
+                vector.apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
 
 
 # --- transposed solve: triangles in the order of the stages, and multipliers in the reverse order --------------------
@@ -472,7 +453,7 @@ def _solve_joint_transposed(factors, sizes, starts, place):
 @kernel
 def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: Matrix, work: Matrix, share: Share) -> None:
     """Solve J^T y = c for rows of c (m, unknowns) and of y (m, equations), with ``work`` and ``share`` as for `solve`."""
-    starts, place = share.starts, address(work, 0)
+    starts, place = share.starts, vector.address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
     segments, rows, n, _, k = sizes
     collocation, tail = factors.local.shape[0] * rows, n + k
@@ -484,28 +465,28 @@ def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: 
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 own = (part.last - part.first) * rows
-                side_by_side(vectors.given, within(given, 0, part.first * rows), own, count)
+                vector.side_by_side(vectors.given, within(given, 0, part.first * rows), own, count)
                 right, parameters = entry(vectors.given, own), entry(vectors.known, 2 * n)
                 if s == segments - 1:
-                    side_by_side(right, within(given, 0, collocation), n, count)
+                    vector.side_by_side(right, within(given, 0, collocation), n, count)
                 else:
                     _clear(right, n)
                 if s == 0:
-                    side_by_side(parameters, within(given, 0, collocation + n), k, count)
+                    vector.side_by_side(parameters, within(given, 0, collocation + n), k, count)
                 else:
                     _clear(parameters, k)
                 _interiors_transposed(layout, factors, part, vectors)
                 _points_transposed(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
             _solve_joint_transposed(factors, sizes, starts, place)
-            apart(within(found, 0, collocation), joint.rest, tail, count)
+            vector.apart(within(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 _multipliers_of_points(factors, n, part, vectors)
                 _multipliers_of_interiors(layout, factors, part, vectors)
-                apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
+                vector.apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
 
 
 class Factored(NamedTuple):

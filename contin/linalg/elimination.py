@@ -12,19 +12,9 @@ import numpy as np
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
+from contin.linalg import vector
 from contin.linalg.blocks import Layout, Share
-from contin.linalg.vector import (
-    PANEL,
-    Rows,
-    at,
-    copy_rows,
-    exchange,
-    invert_triangles,
-    multiply_rows,
-    reduce_column,
-    solve_triangle,
-    subtract_products,
-)  # fmt: skip
+from contin.linalg.vector import PANEL, Rows, at, copy_rows
 
 
 class Eliminated(NamedTuple):
@@ -141,15 +131,15 @@ def eliminate(block, step, pivots):
             pivots[column] = largest
             if largest != row:
                 sign = -sign
-                exchange(at(block, row, left).address, at(block, largest, left).address, finish - left)
-                exchange(at(block, row, tail).address, at(block, largest, tail).address, width - tail)
+                vector.exchange(at(block, row, left).address, at(block, largest, left).address, finish - left)
+                vector.exchange(at(block, row, tail).address, at(block, largest, tail).address, width - tail)
             pivot = block[row, column]
             if pivot < 0:
                 sign = -sign
             if not abs(pivot) < np.inf:
                 sign = np.nan
             if start + PANEL <= width:
-                largest = row + 1 + reduce_column(at(block, row, start), bottom - row - 1, k, size)
+                largest = row + 1 + vector.reduce_column(at(block, row, start), bottom - row - 1, k, size)
                 continue
             for i in range(row + 1, bottom):
                 factor = block[i, column] / pivot
@@ -159,10 +149,10 @@ def eliminate(block, step, pivots):
             if k + 1 < size:
                 largest = _largest(block, Range(row + 1, bottom), column + 1)
         panel = at(block, first, start)
-        solve_triangle(at(block, first, end), panel, finish - end, size)
-        solve_triangle(at(block, first, tail), panel, width - tail, size)
+        vector.solve_triangle(at(block, first, end), panel, finish - end, size)
+        vector.solve_triangle(at(block, first, tail), panel, width - tail, size)
         _subtract_panel(at(block, below, 0), bottom - below, at(block, first, 0), start, size, finish, tail, width)
-        invert_triangles(panel, size)
+        vector.invert_triangles(panel, size)
     return sign
 
 
@@ -182,7 +172,7 @@ def _reduce(matrix, rows, block, step):
 def _multiply(matrix, rows, start, block, first, size):
     """Turn a panel of ``rows`` of a matrix into multipliers of the block's rows from ``first`` on, by the inverse triangle."""
     if start + PANEL <= matrix.shape[1]:
-        multiply_rows(at(matrix, rows.first, start), rows.last - rows.first, at(block, first, start), size)
+        vector.multiply_rows(at(matrix, rows.first, start), rows.last - rows.first, at(block, first, start), size)
         return
     for r in range(rows.first, rows.last):
         for k in range(size - 1, -1, -1):
@@ -198,10 +188,10 @@ def _subtract_panel(rows, count, pivots, start, size, finish, tail, width):
     end, factors = start + size, Rows(rows.address + 8 * start, rows.stride)
     target, source = Rows(rows.address + 8 * end, rows.stride), Rows(pivots.address + 8 * end, pivots.stride)
     if end < finish:
-        subtract_products(target, factors, source, finish - end, count, size)
+        vector.subtract_products(target, factors, source, finish - end, count, size)
     target, source = Rows(rows.address + 8 * tail, rows.stride), Rows(pivots.address + 8 * tail, pivots.stride)
     if tail < width:
-        subtract_products(target, factors, source, width - tail, count, size)
+        vector.subtract_products(target, factors, source, width - tail, count, size)
 
 
 # --- the three stages ------------------------------------------------------------------------------------------------
