@@ -112,8 +112,7 @@ class SecondVariation:
 
 
 def _index(trial: Trial) -> float:
-    system: Any = trial.system
-    found = second_variation(system, trial.x)
+    found = second_variation(trial.system, trial.x)
     return np.nan if found is None else float(found.index())
 
 
@@ -130,7 +129,7 @@ def stability_of(point: SpecialPoint) -> Stability:
     if not nullity:
         index = trial.value(INDEX)
         return Stability() if np.isnan(index) else Stability(int(index))
-    system: Any = trial.system
+    system = trial.system
     try:
         found = second_variation(system, trial.x)
     except ProblemError:  # conditions depend on each other
@@ -145,7 +144,7 @@ def legendre() -> Event:
     """Return the test function that ends a run where the energy ceases to be convex in the controls (Legendre's condition)."""
 
     def margin(trial: Trial) -> float:
-        system: Any = trial.system
+        system = trial.system
         if system.problem.legendre is None:
             parts = _jacobians(system, trial.x)
             value = min(_convexity(jacobian[:, : len(own), len(own) :]) for own, jacobian in parts)

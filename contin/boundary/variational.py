@@ -216,8 +216,7 @@ class VariationalProblem(BoundaryValueProblem):
 
     def index_without_phases(self, trial: Trial) -> int | None:
         """Return the index of a solution where phases are not held, without the modes that symmetries make; None of none."""
-        system: Any = trial.system
-        found = second_variation(system, trial.x, phases=False) if self.phases and self.has_index else None
+        found = second_variation(trial.system, trial.x, phases=False) if self.phases and self.has_index else None
         return None if found is None else int(np.count_nonzero(found.eigenvalues < -LOCATED * np.abs(found.eigenvalues).max()))
 
     @property

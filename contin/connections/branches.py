@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -83,8 +83,8 @@ def _closeness(trial: Trial) -> float:
 
 def _slow_component(trial: Trial, end: int) -> float:
     """Return c at an end of an orbit to a saddle-node, with the sign of a: positive where the slow motion leaves."""
-    p, bend = _system(trial).slow_motion(trial.x)
-    return float(np.sign(bend) * (p @ _system(trial).apart(trial.x)[end]))
+    p, bend = trial.system.slow_motion(trial.x)
+    return float(np.sign(bend) * (p @ trial.system.apart(trial.x)[end]))
 
 
 #: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
@@ -101,7 +101,7 @@ _NON_CENTRAL = tuple(
 
 def _bend(trial: Trial) -> float:
     """Return a, positive at the reference of the discretization: its sign is that of the eigenvector."""
-    system = _system(trial)
+    system = trial.system
     return float(system.slow_motion(trial.x)[1] * np.sign(system.slow_motion(system.reference)[1]))
 
 
@@ -113,7 +113,7 @@ def _second_zero(side: int) -> Event:
     """Return the test function of a second eigenvalue zero, a stable (0) or unstable one: the sum of both that meet."""
 
     def total(trial: Trial) -> float:
-        system = _system(trial)
+        system = trial.system
         rates = system.saddle(trial.x).values.real
         first = system.problem.unstable - side
         return float(rates[first] + rates[first + 1]) * (1 if side else -1)
@@ -127,7 +127,7 @@ def crossing(point: Solution) -> tuple[bool, int]:
     Of an orbit to a saddle-node, the end that is non-central; of one to a saddle, the side of the eigenvalue that is zero.
     """
     trial = Trial.without_tangent(point.system, point.x)
-    if _system(trial).problem.saddle_node:
+    if trial.system.problem.saddle_node:
         return False, int(np.argmin([abs(test.function(trial)) for test in _NON_CENTRAL]))
     return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
 
@@ -150,8 +150,8 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
     if point.label not in (Label.NEUTRAL_SADDLE, Label.NON_CENTRAL, Label.BOGDANOV_TAKENS) or not point.is_located:
         return None
-    if _system(point.trial).problem.saddle_node:
-        values = _system(point.trial).saddle(point.trial.x).values
+    if point.trial.system.problem.saddle_node:
+        values = point.trial.system.saddle(point.trial.x).values
         critical = np.count_nonzero(np.abs(values.real) < ROUGH * np.abs(values).max())
         has_pair = point.label == Label.BOGDANOV_TAKENS and critical > 2
         return (Label.ZERO_HOPF, "zero-Hopf: the saddle-node has a pair, too") if has_pair else None
@@ -162,22 +162,16 @@ def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     return ("SH", "Shilnikov-Hopf") if point.label == Label.NON_CENTRAL and kinds[nearest] else None
 
 
-def _system(trial: Trial) -> ConnectionCollocation:
-    system: Any = trial.system
-    found: ConnectionCollocation = system
-    return found
-
-
 def _leading(trial: Trial, side: int) -> ComplexArray:
     """Return the eigenvalues of one side, 0 stable or 1 unstable, the leading one first."""
-    system = _system(trial)
+    system = trial.system
     values, count = system.saddle(trial.x).values, system.problem.unstable
     return values[:count][::-1] if side else values[count:]
 
 
 def _leading_vectors(trial: Trial, side: int) -> tuple[Array, Array]:
     """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
-    system = _system(trial)
+    system = trial.system
     at = system.problem.unstable - side
     here, there = system.saddle(trial.x).pair(at), system.saddle(system.reference).pair(at)
     signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
@@ -239,7 +233,7 @@ def _component(unit: Array, vector: Array) -> float:
 
 def _orbit_flip(side: int) -> Event:
     def component(trial: Trial) -> float:
-        system, x = _system(trial), trial.x
+        system, x = trial.system, trial.x
         gap = system.apart(x)[1 - side]
         if not np.linalg.norm(gap) > LOCATED * np.max(np.abs(x[: system.state_size])):  # it has no direction
             return float("nan")
@@ -255,7 +249,7 @@ def _inclination_flip(side: int, known: bool = False) -> Event:
     """
 
     def component(trial: Trial) -> float:
-        system, x = _system(trial), trial.x
+        system, x = trial.system, trial.x
         if not known:
             there = system.left_null_vector(system.reference, trial.factors)
             if not np.linalg.norm(system.adjoint_at_ends(x, there)[side]) > CORRECTED:

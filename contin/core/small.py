@@ -29,7 +29,7 @@ SMALL = 32
 
 
 class Equations(NamedTuple):
-    """F(x) = 0, as `contin.equilibria.branches` and `contin.cycles.branches` have it, and room to evaluate it in.
+    """F(x) = 0, as `contin.equilibria.equations` and `contin.cycles.map_equations` have it, and room to evaluate it in.
 
     ``parameters`` are all of them, ``free`` the places of the free ones. ``rates`` (equations,) takes values to rates of states
     divided by their sizes, of u' = F. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and

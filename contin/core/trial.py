@@ -75,14 +75,11 @@ class Trial:
     """
 
     def __init__(
-        self,
-        system: Discretization,
-        x: Array,
-        linear: Linearization | Callable[[], Linearization],
-        iterations: int = 0,
-        newton_error: float = 0.0,
-    ) -> None:
-        self.system, self.x = system, x
+        self, system: Discretization, x: Array, linear: Linearization | Callable[[], Linearization],
+        iterations: int = 0, newton_error: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.system: Any = system  # tests of a kind of problem ask what systems of that kind know
+        self.x = x
         self._settled: Trial | None = None  # not itself: a cycle of references would keep its factors until they are collected
         self.iterations, self.newton_error = iterations, newton_error
         self._linear: Linearization | None = None if callable(linear) else linear

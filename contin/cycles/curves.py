@@ -207,14 +207,12 @@ def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
     critical = 1 + autonomous
 
     def further(trial: Trial) -> float:
-        system: Any = trial.system
-        v, w = system.null_vectors(trial.x)
-        n = len(system.problem.states)
+        v, w = trial.system.null_vectors(trial.x)
+        n = len(trial.system.problem.states)
         return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
 
     def flip(trial: Trial) -> float:
-        system: Any = trial.system
-        exponents = system.base.eigenvalues(trial.x)
+        exponents = trial.system.base.eigenvalues(trial.x)
         others = exponents[np.argsort(np.abs(exponents))[critical:]]
         size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
         multipliers = np.exp(others - size)

@@ -285,7 +285,7 @@ def _at_period(system: CycleCollocation, x: Array, at: int, less: float) -> tupl
 
 
 #: The size of a cycle as a part of an earlier one of the run, with a sign.
-AMPLITUDE = Event(Label.HOPF, "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
+AMPLITUDE = Event(Label.HOPF, "Hopf", lambda trial: trial.system.amplitude(trial.x))  # of cycles
 
 
 def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None:

@@ -16,21 +16,22 @@ from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
 from contin.collocation.mesh import MeshControl
 from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
-from contin.core.protocol import Carrier
+from contin.core.labels import Label
+from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import KEPT, on_circle
 from contin.core.step import COLLAPSED, Reason, Stop
 from contin.core.system import Scales
 from contin.core.trial import Event, Trial
-from contin.cycles.branches import OfCycles, cycle_in_phase, forced_cycle_in_phase, lasting
+from contin.cycles.curves import DoublingCurve, TorusCurve, events_on_folds
 from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_inside, shrunk
-from contin.cycles.floquet import has_double_one, keep_off_one
+from contin.cycles.floquet import critical_angle, doubled, doubles, doubling, has_double_one, keep_off_one, torus, unstable
 from contin.cycles.normal_forms import CycleForm
 from contin.draws import ASIDE
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Columns
-from contin.levels import APART, DOUBLED, LOCATED
+from contin.levels import APART, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import Blocks, Factors
 from contin.linalg.condensation import Factorization
 from contin.linalg.periodic import interval_matrices, log_eigenvalues_along
@@ -43,6 +44,57 @@ _SPLIT = 100.0
 #: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
 #: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
 _PERIOD_SHARE = 0.1
+#: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
+_PLACES = 2048
+#: Newton's steps from the best of these places to the best shift; the distance between places is small, three would do.
+_STEPS = 5
+
+
+class OfCycles(Discretization):
+    """Hooks that both kinds of system answer alike: multipliers say all of it."""
+
+    @property
+    def starts_cycles(self) -> bool:
+        """Yes: of twice the length."""
+        return True
+
+    @property
+    def is_cycle(self) -> bool:
+        """Yes."""
+        return True
+
+    def unstable(self, x: Array) -> int:
+        """Return the number of unstable multipliers, without one that is always 1."""
+        system: Any = self
+        return unstable(system, x)
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """Those of period doublings and torus bifurcations."""
+        return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
+
+    def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
+        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
+        system: Any = self
+        if doubles(point):
+            return DoublingCurve(system), x
+        if point.label == Label.TORUS:
+            return TorusCurve(system), np.append(x, math.cos(critical_angle(system, point, x)))
+        return None
+
+    def events(self) -> list[Event]:
+        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
+        return [doubling(self.order), torus()]
+
+    def events_on_folds(self) -> list[Event]:
+        """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
+        system: Any = self
+        return events_on_folds(system)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, as the end where cycles go twice round ones of half the length."""
+        system: Any = self
+        return doubled(system, point)
 
 
 class PeriodicCollocation(OfCycles, Collocation):
@@ -383,8 +435,41 @@ class ForcedCollocation(PeriodicCollocation):
     # --- what is known of its branches --------------------------------------------------------------------------
 
     def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-        """Return a cycle of several rounds, or one with an image, and vectors at it, to lie closest to another one."""
-        return forced_cycle_in_phase(self, x, vectors, reference)
+        """Return a forced cycle, and vectors at it, so that it lies closest to another one.
+
+        One of several rounds may begin with any of them; one of a field that is odd after half a period has an image.
+        """
+        size, rounds = self.state_size, self.rounds
+        places = [(number / rounds, 1.0) for number in range(rounds)]
+        if self._is_odd(x):
+            places += [((number + 0.5) / rounds, -1.0) for number in range(rounds)]
+
+        def moved(vector: Array, place: tuple[float, float]) -> Array:
+            shift, sign = place
+            if shift == 0:
+                return vector.copy()
+            return np.concatenate([sign * self.perturbation(vector, (self.nodes + shift) % 1).ravel(), vector[size:]])
+
+        def orbit(place: tuple[float, float]) -> Array:
+            shift, sign = place
+            later = self.moved(x, shift)
+            later[:size] *= sign
+            return self.lifted(later, reference)
+
+        def apart(place: tuple[float, float]) -> float:
+            return float(self.weights @ (orbit(place) - reference) ** 2)
+
+        nearest = min(places, key=apart)
+        return orbit(nearest), [moved(vector, nearest) for vector in vectors]
+
+    def _is_odd(self, x: Array) -> bool:
+        """Return whether -u(t + T / 2) is a solution where u is one, T the period of the forcing; it never goes round as u."""
+        if self.rotates:
+            return False
+        image = self.moved(x, 0.5 / self.rounds)
+        image[: self.state_size] *= -1
+        size = np.abs(self.residual(np.where(np.arange(x.size) < self.state_size, -x, x))).max()
+        return bool(np.abs(self.residual(image)).max() <= ROUGH * size)
 
 
 class CycleCollocation(PeriodicCollocation):
@@ -621,11 +706,51 @@ class CycleCollocation(PeriodicCollocation):
 
     def lasting(self, x: Array) -> Array:
         """Return free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""
-        return lasting(self, x)
+        size, n = self.state_size, len(self.problem.state_names)
+        states = x[:size].reshape(-1, n)[:, self.circles == 0]
+        weights = self.weights[:size:n]
+        means = weights @ states
+        square = weights @ np.einsum("ka,ka->k", states, states) - means @ means
+        return np.concatenate([x[size:], means, [np.sqrt(max(square, 0.0))]])
 
     def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
         """Return a cycle, and vectors at it, shifted in time to lie closest to another one."""
-        return cycle_in_phase(self, x, vectors, reference)
+        shift, size = self._shift(x, reference), self.state_size
+        times = (self.nodes + shift) % self.order
+
+        def moved(vector: Array) -> Array:
+            return np.concatenate([self.perturbation(vector, times).ravel(), vector[size:]])
+
+        return self.lifted(self.moved(x, shift), reference), [moved(vector) for vector in vectors]
+
+    def _shift(self, x: Array, reference: Array) -> float:
+        """Return the s at which the integral of |u(t + s) - v(t)|^2 is least, v the reference; angles up to whole rounds.
+
+        With u = a t + w, where angles gain a in the whole cycle, and w periodic, it is the integral of w(t + s) . w_v(t), both
+        without their means, less half the square of a s + the mean of u - v, up to whole rounds, that is largest.
+        """
+        part = np.arange(_PLACES) / _PLACES
+        gained = self.gains[-1] / self.scales.states
+        orbits = [self.evaluate_scaled(z, self.order * part) - part[:, None] * gained for z in (x, reference)]
+        means = orbits[0].mean(axis=0) - orbits[1].mean(axis=0)
+        ours, theirs = (np.fft.fft(orbit, axis=0) for orbit in orbits)
+        products = np.sum(ours * theirs.conj(), axis=1)
+        frequencies = 2 * np.pi * np.fft.fftfreq(_PLACES, 1 / _PLACES)
+
+        def drift(s: Any) -> Array:
+            """Return a s + the mean of u - v, of angles that rotate, up to whole rounds."""
+            apart = np.where(gained != 0, np.multiply.outer(s, gained) + means, 0.0)
+            return apart - whole_rounds(apart, self.circles)
+
+        s = float((np.fft.ifft(products).real / _PLACES - (drift(part) ** 2).sum(axis=1) / 2).argmax()) / _PLACES
+        for _ in range(_STEPS):
+            waves = products * np.exp(1j * frequencies * s) / _PLACES**2
+            slope = float((1j * frequencies * waves).sum().real - gained @ drift(s))
+            bend = float((-(frequencies**2) * waves).sum().real - gained @ gained)
+            if not bend < 0:
+                break
+            s -= slope / bend
+        return self.order * s
 
 
 def _turns(times: Array) -> Indices:

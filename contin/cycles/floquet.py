@@ -189,8 +189,7 @@ def doubling(order: int = 1) -> Event:
 
 
 def _antiperiodic(trial: Trial) -> float:
-    system: Any = trial.system
-    values = system.computed_eigenvalues(trial.x)
+    values = trial.system.computed_eigenvalues(trial.x)
     with np.errstate(invalid="ignore"):  # NaN where there are none
         size = np.exp(-np.abs(values.real))
         ahead = np.exp(1j * values.imag)
@@ -245,13 +244,12 @@ def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
 
 def _is_still(arc: Arc) -> bool:
     """Return whether the cycle at the end of a step cannot be told from a homoclinic orbit."""
-    system: Any = arc.trial.system
-    return bool(system.autonomous and system.intervals) and is_still(arc.trial)
+    return bool(arc.trial.system.autonomous and arc.trial.system.intervals) and is_still(arc.trial)
 
 
 def _comes_near(arc: Arc, what: int) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
-    system: Any = arc.trial.system
+    system = arc.trial.system
     longer = system.unit_time(arc.trial.x) / system.unit_time(arc.before.x) if system.intervals else 1.0
     ends = np.array([_without_trivial(arc.before), _without_trivial(arc.trial)])
     real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
@@ -261,8 +259,7 @@ def _comes_near(arc: Arc, what: int) -> bool:
 @functools.lru_cache(maxsize=4)
 def _without_trivial(trial: Trial) -> ComplexArray:
     """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
-    system: Any = trial.system
-    values, trivial = system.eigenvalues(trial.x), _trivial(system, trial.x)
+    values, trivial = trial.system.eigenvalues(trial.x), _trivial(trial.system, trial.x)
     return values if trivial is None else np.delete(values, trivial)
 
 
@@ -276,8 +273,7 @@ def keep_off_one(arc: Arc) -> bool:
 
 def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newton) -> bool:
     """Return whether a test function changes its sign on the mesh halved, too; looked at where multipliers are in doubt."""
-    system: Any = left.system
-    if not any(system.is_drifted(trial.x) for trial in (left, right)):
+    if not any(left.system.is_drifted(trial.x) for trial in (left, right)):
         return True
     finer = [on_finer_mesh(trial, newton) for trial in (left, right)]
     values = [trial.value(test) for trial in finer if trial is not None]
@@ -313,8 +309,7 @@ def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
 @functools.lru_cache(maxsize=4)
 def _unstable(trial: Trial) -> int:
     """Return the number of unstable multipliers of a cycle, however near to the circle."""
-    system: Any = trial.system
-    return unstable(system, trial.x, 0.0)
+    return unstable(trial.system, trial.x, 0.0)
 
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:
@@ -324,9 +319,8 @@ def _doubtful(point: SpecialPoint) -> SpecialPoint:
 
 def _mean_little(trial: Trial) -> bool:
     """Return whether the multiplier that is 1 has such an error that others mean little."""
-    system: Any = trial.system
-    trivial = _trivial(system, trial.x)
-    return trivial is not None and not abs(np.expm1(system.eigenvalues(trial.x)[trivial])) <= _MEANINGLESS
+    trivial = _trivial(trial.system, trial.x)
+    return trivial is not None and not abs(np.expm1(trial.system.eigenvalues(trial.x)[trivial])) <= _MEANINGLESS
 
 
 def _passes(arc: Arc, point: SpecialPoint) -> bool:

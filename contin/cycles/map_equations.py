@@ -10,8 +10,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.spectral import on_circle
 from contin.core.system import Scales
-from contin.cycles.branches import OfCycles, map_in_phase
-from contin.cycles.equations import is_opposite, is_pair
+from contin.cycles.equations import OfCycles, is_opposite, is_pair
 from contin.cycles.normal_forms import MOST, MapForm
 from contin.equilibria.equations import Algebraic
 from contin.events.arc import SpecialPoint
@@ -325,5 +324,13 @@ class MapSystem(OfCycles, Algebraic):
         return None if self.state_size > MOST else at_special_point(self, point)
 
     def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-        """Return a cycle, which may begin with any of its points, and vectors at it, to lie closest to another one."""
-        return map_in_phase(self, x, vectors, reference)
+        """Return a cycle of a map, which may begin with any of its points, and vectors at it, to lie closest to another one."""
+
+        def apart(shift: int) -> float:
+            return float(self.weights @ (self.lifted(self.moved(x, shift), reference) - reference) ** 2)
+
+        nearest = min(range(self.rounds), key=apart)
+        turned = [vector.copy() for vector in vectors]
+        for vector in turned:
+            self.states(vector)[:] = np.roll(self.states(vector), -nearest, axis=0)
+        return self.lifted(self.moved(x, nearest), reference), turned

@@ -386,8 +386,7 @@ class EventCurve(Defining):
 
 
 def _confirmed(trial: Trial) -> float:
-    system: Any = trial.system
-    return 1.0 if system.is_confirmed(trial.x) else -1.0
+    return 1.0 if trial.system.is_confirmed(trial.x) else -1.0
 
 
 def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
@@ -396,5 +395,4 @@ def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
 
 
 def _solution(trial: Trial) -> Trial:
-    system: Any = trial.system
-    return Trial.without_tangent(system.base, system.inside(trial.x))
+    return Trial.without_tangent(trial.system.base, trial.system.inside(trial.x))

@@ -205,7 +205,7 @@ class Defining(Discretization):
         """
 
         def amplitude(trial: Trial) -> float:
-            system: Any = trial.system
+            system = trial.system
             return float(system.base.amplitude(system.inside(trial.x)) - _SHRUNK * 2.0 ** math.frexp(system.largest)[1])
 
         name = "the end, near a Hopf point where the cycles have no size"

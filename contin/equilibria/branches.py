@@ -108,15 +108,14 @@ def events_on_folds() -> list[Event]:
     """Return those of a second eigenvalue zero (Bogdanov-Takens), and of a pair on the imaginary axis (zero-Hopf)."""
 
     def double_zero(trial: Trial) -> float:
-        system: Any = trial.system
+        system = trial.system
         v, w = system.null_vectors(trial.x)
         base, scales = system.base, system.base.scales
         v, w = v[: base.state_size] * scales.states, w / scales.rows["residual"]
         return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))
 
     def others(trial: Trial) -> tuple[float, bool]:
-        system: Any = trial.system
-        values = system.base.eigenvalues(trial.x)
+        values = trial.system.base.eigenvalues(trial.x)
         return other_pairs(np.delete(values, np.argmin(np.abs(values))))
 
     return [

@@ -59,17 +59,15 @@ def critical_real_part(frequency: float) -> Callable[[Trial], float]:
 
 def _real_part(trial: Trial, value: complex) -> float:
     """Return the real part of the eigenvalue that is nearest to a value."""
-    system: Any = trial.system  # one with eigenvalues
-    if getattr(system, "finds_nearest", False):
-        return float(system.eigenvalue_near(trial.x, value).real)
+    if getattr(trial.system, "finds_nearest", False):
+        return float(trial.system.eigenvalue_near(trial.x, value).real)
     values = _upper(trial)
     return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
 
 def _upper(trial: Trial) -> ComplexArray:
     """Return the eigenvalues with a positive imaginary part, and real ones."""
-    system: Any = trial.system  # one with eigenvalues
-    values: ComplexArray = system.computed_eigenvalues(trial.x)
+    values: ComplexArray = trial.system.computed_eigenvalues(trial.x)
     return values[values.imag > -DOUBLED * (1 + np.abs(values))]
 
 
@@ -145,7 +143,7 @@ def _passes_as_pair(left: Trial, right: Trial) -> bool:
 
 def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
-    system: Any = left.system
+    system = left.system
     if not (np.any(system.eigenvalues(left.x).real > 0) or np.any(system.eigenvalues(right.x).real > 0)):
         return np.empty(0, complex), np.empty(0, complex)  # as where all is stable
     first, last = _matched(left, right)
@@ -163,7 +161,7 @@ def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     Of a large matrix only those right of the axis or near to it are known, and their number differs from place to place. One
     right of the axis that is left over at one place has gone far to the left at the other: it is looked for there.
     """
-    system: Any = left.system
+    system = left.system
     first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
     if not (np.isfinite(first).all() and np.isfinite(last).all()):
         return np.empty(0, complex), np.empty(0, complex)
@@ -230,7 +228,7 @@ def _located(arc: Arc, left: Place, right: Place, both: tuple[complex, complex])
         return None
     here = first + (last - first) * (at - a) / (b - a)
     frequency = float(values[np.argmin(np.abs(values - here))].imag)
-    system: Any = there.system
+    system = there.system
     crossing = system.crossing(there.x, frequency)
     if crossing is None:
         return None
@@ -249,7 +247,7 @@ def passes(arc: Arc, at: float, frequency: float) -> bool:
     sides = []
     for s in (at - BESIDE * arc.step, at + BESIDE * arc.step):
         trial = arc.near(s)
-        system: Any = trial.system
+        system = trial.system
         values = system.eigenvalues(trial.x)
         sides.append(values[np.argmin(np.abs(values - 1j * frequency))].real)
     return bool(sides[0] * sides[1] < 0)

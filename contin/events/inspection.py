@@ -468,11 +468,7 @@ Entry = Callable[[Inspection], bool]
 
 
 def watch_list(
-    system: Discretization,
-    settings: Settings,
-    tests: Sequence[Event],
-    fold: Event | None,
-    index: Event | None,
+    system: Discretization, settings: Settings, tests: Sequence[Event], fold: Event | None, index: Event | None
 ) -> list[Entry]:
     """Return the entries of a run; each returns whether it asks for a closer look at a step.
 

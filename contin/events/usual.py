@@ -191,8 +191,7 @@ def extremum(column: str) -> Event:
     """Return the test function of extrema of a column along a curve: its derivative along the tangent."""
 
     def slope(trial: Trial) -> float:
-        system: Any = trial.system
-        gradient = system.column_gradient(trial.x, column)
+        gradient = trial.system.column_gradient(trial.x, column)
         return _difference(trial, column) if gradient is None else float(gradient @ trial.tangent)
 
     return Event(Label.EXTREMUM, column, slope, describe=lambda trial: curvatures(trial, column), column=column)
