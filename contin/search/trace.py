@@ -28,8 +28,7 @@ from contin.cycles.equations import CycleCollocation, PeriodicCollocation
 from contin.cycles.floquet import doubles
 from contin.cycles.map_equations import MapSystem
 from contin.cycles.statement import CycleProblem
-from contin.equilibria.branches import CriticalPair, critical_pair
-from contin.equilibria.equations import Algebraic
+from contin.equilibria.equations import Algebraic, CriticalPair, critical_pair
 from contin.errors import ConvergenceError, ProblemError, warn
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import finding_of, frequency_of

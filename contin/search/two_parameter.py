@@ -54,8 +54,7 @@ from contin.cycles.curves import TorusCurve
 from contin.defining.critical import HopfCurve
 from contin.defining.special_points import BranchPointCurve, EventCurve, ExtremumCurve, FoldCurve
 from contin.defining.system import Defining
-from contin.equilibria.branches import HOMOCLINIC, critical_pair
-from contin.equilibria.equations import Algebraic
+from contin.equilibria.equations import HOMOCLINIC, Algebraic, critical_pair
 from contin.errors import ConvergenceError, ProblemError
 from contin.levels import APART, ROUGH
 from contin.problems.statement import TIME

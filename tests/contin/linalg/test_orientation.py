@@ -14,7 +14,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem
-from contin.equilibria.branches import critical_pair
+from contin.equilibria.equations import critical_pair
 from contin.linalg.orientation import canonical_basis, eigenbasis, first_least, ordered, oriented, oriented_along, pivot
 
 SEEDS = range(12)
