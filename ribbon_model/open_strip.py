@@ -18,13 +18,13 @@ from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
+from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
 from contin.lowlevel import Collocation, Continuation, Undetermined, shown
-from ribbon_model import ends, first_guesses, law_end, loads
+from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PHASES, PLACE, End, Roller
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
-from ribbon_model.first_guesses import Guess
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.section import Section, natural_end, natural_states
 from ribbon_model.shape import Shape, shape_of
@@ -35,6 +35,10 @@ REACTIONS = tuple(
 )  # fmt: skip
 #: Most phases of a strip: it can shift and turn about itself.
 _MOST_PHASES = 2
+#: A first guess: a function of the arclength that returns quaternion and centreline, seven numbers.
+Guess = Callable[[float], list[float]]
+#: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
+_STEEPEST = 2.4
 
 
 @dataclass  # the directions are normalised when it is made, and then left as they are
@@ -217,7 +221,7 @@ class OpenStrip:
     # --- first states -------------------------------------------------------------------------------------------------
 
     def arch(self, distance: float | None = None, side: float = 1.0) -> Guess:
-        """Return a guess of a planar state whose ends are nearer than its length (`first_guesses.arch`).
+        """Return a guess of a planar state whose ends are nearer than its length: an Euler mode of these ends.
 
         Parameters
         ----------
@@ -225,17 +229,43 @@ class OpenStrip:
             That of the ends; the number of this name by default, .9 where there is none.
         side : float
             +1 to the side of the normal, -1 to the other one.
+
+        Raises
+        ------
+        ValueError
+            The ends are too near or too far.
         """
         distance = self.parameters.get("distance", 0.9) if distance is None else distance
-        return self._with_multipliers(first_guesses.arch(self.start, self.finish, distance, side))
+        mode = _euler_mode(self.start, self.finish)
+        s = np.linspace(0, 1, 2001)
+        mode_values = mode(s) / np.abs(mode(s)).max()
+        least = float(np.mean(np.cos(_STEEPEST * mode_values)))
+        if not least < distance <= 1:
+            raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
+        amplitude = brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0.0, _STEEPEST)  # it falls
+        angle = side * amplitude * mode_values
+        steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
+        place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+        def guess(t):
+            a, y, z = (np.interp(t, s, column) for column in (angle, *place.T))
+            return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z]
+
+        return self._with_multipliers(guess)
 
     def twisted(self, turn: float) -> Guess:
         """Return a guess of a straight strip that is evenly twisted."""
-        return self._with_multipliers(first_guesses.twisted(turn))
+        return self._with_multipliers(lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t])
 
     def twisted_circle(self, half_twists: float = 0) -> Guess:
         """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
-        return self._with_multipliers(first_guesses.twisted_circle(half_twists))
+
+        def guess(t):
+            a, b, r = math.pi * t, math.pi * half_twists * t / 2, 1 / (2 * math.pi)
+            q = ends.product((math.cos(a), math.sin(a), 0, 0), (math.cos(b), 0, 0, math.sin(b)))
+            return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a)]
+
+        return self._with_multipliers(guess)
 
     def _with_multipliers(self, guess: Guess) -> Guess:
         return lambda t: [*guess(t), *[0] * self.conditions_inside]
@@ -497,3 +527,23 @@ def _moved(state, k: int, n: int) -> np.ndarray:
         change[:4] = ends.product((0, *axis / 2), state[:4])
         change[4:7] = np.cross(axis, state[4:7])
     return change
+
+
+def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the angle along a column of these ends as it buckles, up to a factor."""
+    tangent = 4.493409457909064  # the first zero of tan x = x
+    turns_start, turns_finish = (_turns_about_width(end) for end in (start, finish))
+    if not finish.held and finish.rotation == FREE:
+        return lambda s: 1 - np.cos(math.pi * s / 2)
+    if turns_start and turns_finish:
+        return lambda s: np.cos(math.pi * s)
+    if turns_finish:
+        return lambda s: tangent * np.cos(tangent * (1 - s)) - math.sin(tangent)
+    if turns_start:
+        return lambda s: tangent * np.cos(tangent * s) - math.sin(tangent)
+    return lambda s: np.sin(2 * math.pi * s)
+
+
+def _turns_about_width(end: End) -> bool:
+    """Return whether an end can turn about the width."""
+    return (end.rotation == HINGED and abs(end.axis[0]) > 1 - LOOSE) or end.rotation in (FREE, JOINT)
