@@ -63,38 +63,34 @@ class OfCycles(Discretization):
         """Yes."""
         return True
 
-    def unstable(self, x: Array) -> int:
+    def unstable(self: Any, x: Array) -> int:
         """Return the number of unstable multipliers, without one that is always 1."""
-        system: Any = self
-        return unstable(system, x)
+        return unstable(self, x)
 
     @property
     def curves(self) -> Mapping[str, type]:
         """Those of period doublings and torus bifurcations."""
         return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
 
-    def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
+    def defining(self: Any, point: Any, x: Array) -> tuple[Any, Array] | None:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
-        system: Any = self
         if doubles(point):
-            return DoublingCurve(system), x
+            return DoublingCurve(self), x
         if point.label == Label.TORUS:
-            return TorusCurve(system), np.append(x, math.cos(critical_angle(system, point, x)))
+            return TorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))
         return None
 
     def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
         return [doubling(self.order), torus()]
 
-    def events_on_folds(self) -> list[Event]:
+    def events_on_folds(self: Any) -> list[Event]:
         """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
-        system: Any = self
-        return events_on_folds(system)
+        return events_on_folds(self)
 
-    def judged(self, point: SpecialPoint) -> SpecialPoint:
+    def judged(self: Any, point: SpecialPoint) -> SpecialPoint:
         """Return a special point, as the end where cycles go twice round ones of half the length."""
-        system: Any = self
-        return doubled(system, point)
+        return doubled(self, point)
 
 
 class PeriodicCollocation(OfCycles, Collocation):

@@ -49,10 +49,9 @@ class Finding:
         """
         raise NotImplementedError(f"a {type(self).__name__} has no equations")
 
-    def there(self, system: Discretization, tangent: Array) -> Trial:
+    def there(self: Any, system: Discretization, tangent: Array) -> Trial:
         """Return the point that was found, with a tangent."""
-        own: Any = self
-        return Trial(system, own.x, Linearization(tangent, np.nan))
+        return Trial(system, self.x, Linearization(tangent, np.nan))
 
     def round_off(self, system: Discretization, newton: Newton) -> Array | float:
         """Return by how much free parameters are off where Newton's method ends by round-off, shape (further unknowns,)."""

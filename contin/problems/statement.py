@@ -101,10 +101,9 @@ class Restated:
         return self.reduced or self
 
     @property
-    def dimension(self) -> int:
+    def dimension(self: Any) -> int:
         """Number of states that a user sees: without multipliers, which a kind may add."""
-        own: Any = self
-        return len(own.states)
+        return len(self.states)
 
     def usual_degree(self, tolerance: float) -> int:
         """Return the degree of a mesh where none is given; 0 where there is no mesh."""
@@ -115,9 +114,8 @@ class Restated:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    def __repr__(self) -> str:
-        statement: Any = self
-        states, parameters = checks.listed(statement.states), checks.listed(statement.parameters)
+    def __repr__(self: Any) -> str:
+        states, parameters = checks.listed(self.states), checks.listed(self.parameters)
         return f"{type(self).__name__}(states {states}; parameters {parameters or 'none'})"
 
     def __new__(cls, *arguments: object, **options: object) -> Any:
@@ -131,7 +129,7 @@ class Restated:
         """Return the arguments of the functions that the problem is stated with, by the name of the field."""
         return {}
 
-    def describe(self) -> str:
+    def describe(self: Any) -> str:
         """Return a line for each group of functions: how it is evaluated and why, and how many operations it has.
 
         Examples
@@ -141,13 +139,11 @@ class Restated:
         >>> print(cubic.describe())
         residual: recorded, 3 operations, 6 with all first derivatives
         """
-        own: Any = self
-        return "\n".join(f"{name}: {own.batch(name).describe()}" for name in self._groups())
+        return "\n".join(f"{name}: {self.batch(name).describe()}" for name in self._groups())
 
-    def _groups(self) -> list[str]:
+    def _groups(self: Any) -> list[str]:
         """Return the names of the groups of functions."""
-        own: Any = self
-        functionals = ["functionals"] if own.functionals else []
+        functionals = ["functionals"] if self.functionals else []
         return ["residual", *functionals]
 
     def __reduce__(self) -> Any:
