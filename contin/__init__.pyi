@@ -14,11 +14,10 @@ from .errors import ContinError, ConvergenceError, ProblemError
 from .results.branch import Branch
 from .results.point import Point
 from .results.storage import load, save
-from .search.cycle import cycle
 from .search.diagram import Diagram, diagram
 from .search.further import Search
-from .search.homoclinic import homoclinic
 from .search.many import batch
+from .search.orbits import cycle, homoclinic
 from .search.solving import solve
 from .search.trace import trace
 from .search.two_parameter import curve
