@@ -297,6 +297,7 @@ def test_hinges_are_those_of_the_strip_in_whatever_plane_it_is_drawn(tmp_path, c
     assert f"held: A: about: width is the direction ({', '.join(str(abs(x)) for x in axis)})" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_what_a_file_holds(run, tmp_path):
     """Columns, words, shapes; the scene is written and read back; the picture has every member."""
     branch = run(CANTILEVER)

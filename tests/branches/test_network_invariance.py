@@ -241,8 +241,8 @@ def _random(seed: int) -> dict:
     }  # fmt: skip
 
 
-#: A load that a joint bears, one that is refused as strips can move, and one under weight: tried by default.
-FEW = (1, 9, 27)
+#: One under weight is tried by default; others take longer.
+FEW = (27,)
 
 
 @pytest.mark.parametrize("seed", [*FEW, *(pytest.param(n, marks=pytest.mark.full) for n in range(30) if n not in FEW)])

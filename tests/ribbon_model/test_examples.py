@@ -9,7 +9,7 @@ from printed import check_examples
 import ribbon_model
 
 #: Modules whose examples compile their problems, which takes ten seconds and more.
-LONG = {"barriers", "open_strip", "seeds", "solution"}
+LONG = {"closed_search", "barriers", "open_strip", "seeds", "solution"}
 MODULES = sorted(module.name for module in pkgutil.iter_modules(ribbon_model.__path__))
 
 
