@@ -28,10 +28,8 @@ from contin.events.labelled import Finding
 from contin.levels import APART, CERTAIN, CORRECTED, DOUBLED, LOCATED, ROUGH, TINY
 from contin.linalg.border import random_rows
 
-#: So many conditions that meet in one point are tried with all outcomes: 64.
+#: So many conditions that meet in one point are tried with all outcomes: 64. Of more, as of equal machines, one or all change.
 _MOST = 6
-
-
 #: Parts of a step at which numbers are looked at between its ends, and below which part of the larger one there they may pass
 #: zero twice; so many places are tried then.
 _PARTS, _NEAR, _LOOKS = (0.25, 0.5, 0.75), 0.1, 4
@@ -151,7 +149,10 @@ def zeros(system: Discretization, x: Array) -> list[int]:
 def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
     """Return the ways that leave x with any outcomes of conditions, why some have none, and whether slopes jump."""
     found, missing, slopes = list[Way](), "", list[Any]()
-    for sides in itertools.product((1.0, -1.0), repeat=len(zero)) if len(zero) <= _MOST else ():
+    held, few = system.sides[list(zero)], len(zero) <= _MOST
+    for sides in (
+        itertools.product((1.0, -1.0), repeat=len(zero)) if few else (held, -held, *held * (1 - 2 * np.eye(len(zero))))
+    ):
         there = with_outcomes(system, x, dict(zip(zero, sides)))
         with np.errstate(all="ignore"):
             jacobian = there.slopes(x)

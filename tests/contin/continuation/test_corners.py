@@ -78,6 +78,27 @@ def test_a_diamond_closes():
     assert branch.stop.reason == "closed"
 
 
+def test_many_equal_machines_reach_their_limits_together():
+    """x_k = min(a, 1) for twelve k, and y their sum: all change at a = 1. A limit of the run may lie there."""
+    names = [f"x{k}" for k in range(12)]
+    branch = followed(
+        lambda u, p: (*(min(p.a, 1.0) - x for x in u[:12]), sum(u[:12]) - u.y), [*names, "y"], 0.5, [0.5] * 13, 0, 2
+    )
+    assert branch.labelled("BC")[0]["a"] == 1 and branch[-1]["y"] == 12 and branch[-1]["a"] == 2
+    branch = followed(lambda u, p: (max(u.x, 1.0) - p.a,), ["x"], 2.0, [2.0], 1, 3, direction=-1)
+    assert branch[-1]["a"] == 1
+
+
+def test_equal_contacts_that_differ():
+    """x + 8 springs that touch at x = 1 by numbers of their own, a (1 + k) - a x: eight conditions are zero at one point."""
+
+    def force(u, p):
+        return (u.x + sum(max(0, (1 + k) * (u.x - 1)) for k in range(8)) - p.a,)
+
+    branch = followed(force, ["x"], 0.5, [0.5], 0, 10)
+    assert corners(branch) == [(1, "goes on")] and branch[-1]["x"] == pytest.approx(1 + 9 / 37, abs=1e-12)
+
+
 @pytest.mark.parametrize("depth", [1e-1, 1e-3, 1e-5, -1e-3])
 def test_numbers_that_pass_zero_twice_in_a_step(depth):
     """x = a^2 - depth: y = |x| has two corners at a = +- sqrt(depth), and none where x stays positive."""
