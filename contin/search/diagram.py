@@ -314,6 +314,8 @@ class _Explorer:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
         begins = switches(point)
         known = finding_of(point.details)
+        if point.label == Label.CORNER:
+            return False  # the run takes the straightest way
         if known.is_branch_point and not begins:
             return bool(known.leaving) and self._arrived(point, number, depth)
         return begins and self._met(point, number, depth)

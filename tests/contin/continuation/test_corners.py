@@ -60,6 +60,7 @@ def test_where_sides_change_their_branches_several_ways_leave():
     assert corner.details.kind == "several" and len(corner.details.ways) == 3
     ends = [trace(corner, branch=number, limits={"a": (-1, 1)}).points[-1].x.round(12) + 0.0 for number in range(3)]
     assert sorted(map(tuple, ends)) == [(-1, 1), (0, -1), (0, 1)]
+    assert len(contin.diagram(branch[0], limits={"a": (-1, 1)}).branches) >= 2
 
 
 def test_stability_may_change_by_a_jump(tmp_path):
