@@ -63,6 +63,7 @@ PALETTE = (
 _MARKS = {
     "EP": (".", Colour.BLACK, "end"),
     "LP": ("*", Colour.VERMILION, "fold"),
+    "BC": ("v", Colour.VERMILION, "corner"),
     "BP": ("o", Colour.BLACK, "branch point"),
     "HB": ("s", Colour.GREEN, "Hopf point"),
     "UZ": ("D", Colour.PURPLE, "given value"),
