@@ -32,7 +32,7 @@ from contin.core.step import Reason, State, Stop, predict, up_to_limits
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
-from contin.events.corner import conditions, corner_at
+from contin.events.corner import conditions, corner_at, refrozen
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.levels import APART, ROUGH
@@ -223,7 +223,7 @@ class Continuation:
             return
         self._accuracy = accuracy_of(step.end)
         arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
-        special = within_limits(arc, special, [*self._limits, *self._conditions])
+        special = within_limits(arc, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
@@ -242,6 +242,8 @@ class Continuation:
             if self.stop is not None:
                 return
         self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
+        if any(step.end.value(test) >= 0 for test in self._conditions):  # the equations are the same beyond
+            self.state = dataclasses.replace(self.state, system=refrozen(step.end))
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[0])
@@ -261,7 +263,7 @@ class Continuation:
         if ways:
             at, accepted = corner or point, state.accepted + 1
             behind = on_branch(ways[0].system, at.trial.x, ways[0].tangent, settings, False)
-            length, step = state.arclength + at.at, min(state.step, settings.step)
+            length, step = state.arclength + at.at, min(state.step, settings.step) if corner else state.step
             self.go_on((dataclasses.replace(behind, arclength=length, step=step, accepted=accepted), None))
             left = np.concatenate([at.trial.x, ways[0].tangent])
             if any(np.abs(left - known).max() < APART for known in self._left if known.size == left.size):

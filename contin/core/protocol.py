@@ -237,29 +237,14 @@ class Discretization(Equations, Protocol):
         """Return why a solution x comes with others around it, of which round-off chose one, as a sentence; "" if not."""
         return ""
 
-    # --- conditions that unknowns decide ---------------------------------------------------------------------------------
-
-    #: What the user has written for each; none where outcomes are not frozen.
-    conditions: tuple[str, ...] = ()
-    #: Their frozen outcomes, 1 or -1 each; none in the equations as they are.
+    #: Number of conditions that unknowns decide (`contin.events.corner`), and their frozen outcomes, 1 or -1 each.
+    conditions: int = 0
     sides: Array = np.empty(0)
-
-    def with_sides(self, sides: Array) -> Any:
-        """Return the same with frozen outcomes; with none, the equations as they are."""
-        return self
 
     @property
     def thawed(self) -> Any:
-        """The equations as they are."""
+        """The same without frozen outcomes."""
         return self
-
-    def numbers(self, x: Array) -> tuple[Array, Array]:
-        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
-        return np.empty(0), np.empty((0, x.size))
-
-    def slopes(self, x: Array) -> Array:
-        """Return the derivatives by x of what outcomes decide, shape (equations or fewer, size)."""
-        return np.empty((0, x.size))
 
     @property
     def curves(self) -> Mapping[str, type]:

@@ -252,12 +252,15 @@ class Algebraic(Spectral, System):
     # --- conditions that unknowns decide -------------------------------------------------------------------------
 
     @functools.cached_property
-    def conditions(self) -> tuple[str, ...]:  # type: ignore[override]
-        """What the user has written for each; none of a map, and with a given Jacobian."""
+    def conditions(self) -> int:  # type: ignore[override]
+        """Their number; none of a map, and with a given Jacobian."""
+        taken = type(self) is Algebraic and self.problem.jacobian is None
+        return len(self.problem.batch("residual").conditions(self._free)) if taken else 0
+
+    def written(self, k: int) -> str:
+        """Return what the user has written for a condition."""
         batch = self.problem.batch("residual")
-        if type(self) is not Algebraic or self.problem.jacobian is not None:
-            return ()
-        return tuple(source(batch, place) for place in batch.conditions(self._free))
+        return source(batch, batch.conditions(self._free)[k])
 
     def with_sides(self, sides: Array) -> Algebraic:
         """Return the same with frozen outcomes; with none, the equations as they are."""
@@ -272,10 +275,16 @@ class Algebraic(Spectral, System):
 
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
-        batch = self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
+        batch, columns = self._deciding
         given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
-        values, slopes = batch.jacobian(*given, batch.columns(self._free))
+        values, slopes = batch.jacobian(*given, columns)
         return values[0], slopes[0]
+
+    @functools.cached_property
+    def _deciding(self) -> tuple[Batch, Columns]:
+        """The numbers that decide, and columns of their derivatives."""
+        batch = self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
+        return batch, batch.columns(self._free)
 
     def slopes(self, x: Array) -> Array:
         """Return F_x, shape (equations, size)."""

@@ -9,6 +9,7 @@ turns, or several leave. Where no way does, the equations jump, and the branch e
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array
 from contin.core.labels import Label
-from contin.core.protocol import Discretization, inner
+from contin.core.protocol import inner
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
@@ -78,23 +80,19 @@ class Corner(Finding):
 class Way(NamedTuple):
     """A way that leaves a corner: the system with its outcomes, and the unit tangent."""
 
-    system: Discretization
+    system: Any
     tangent: Array
 
 
-def conditions(system: Discretization) -> list[Event]:
+def conditions(system: Any) -> list[Event]:
     """Return the test functions of conditions that unknowns decide: positive beyond the frozen outcome."""
-    return [_condition(name, k) for k, name in enumerate(system.conditions)]
+    return [_condition(k) for k in range(system.conditions)]
 
 
-def _condition(name: str, k: int) -> Event:
-    def beyond(trial: Trial) -> float:
-        values, slopes = trial.system.numbers(trial.x)
-        return -float(trial.system.sides[k] * values[k]) - _level(slopes[k], trial.x, CERTAIN * CORRECTED)
-
+def _condition(k: int) -> Event:
     def between(arc: Arc, _: object) -> list[SpecialPoint] | None:
         if arc.passes(test):
-            return None
+            return [] if refrozen(arc.trial) is not None else None
         part, looks = comes_near(test, arc.before, arc.trial), 0
         while ROUGH < part < 1 - ROUGH and looks < _LOOKS:
             there = arc.low + part * (arc.step - arc.low), arc.near(arc.low + part * (arc.step - arc.low))
@@ -106,8 +104,15 @@ def _condition(name: str, k: int) -> Event:
             part, looks = (part - slope / bend) / 2 if bend < 0 else 0.0, looks + 1
         return []
 
-    test = Event(Label.CORNER, name, beyond, terminal=True, limit=True, search=between)
+    test = Event(Label.CORNER, str(k), lambda trial: float(_beyond(trial)[k]), terminal=True, limit=True, search=between)
     return test
+
+
+@functools.lru_cache(maxsize=8)
+def _beyond(trial: Trial) -> Array:
+    """Return how far a point lies beyond each outcome, less what Newton's method leaves: a number that stays zero is none."""
+    values, slopes = trial.system.numbers(trial.x)
+    return np.asarray(-trial.system.sides * values - _level(slopes, trial.x, CERTAIN * CORRECTED))
 
 
 def comes_near(test: Event, before: Trial, trial: Trial) -> float:
@@ -115,40 +120,62 @@ def comes_near(test: Event, before: Trial, trial: Trial) -> float:
 
     It may be positive inside where both ends are negative.
     """
-    ahead = trial.x - before.x
-    length = np.sqrt(inner(trial.system, ahead, ahead))
-    a, b = length * before.tangent, length * trial.tangent
-    values = []
-    for s in _PARTS:
-        x = before.x + s * (a + s * (3 * ahead - 2 * a - b + s * (a + b - 2 * ahead)))
-        values.append(test.function(Trial(trial.system, x, before.linear)))
+    values = [test.function(between) for between in _inside(before, trial)]
     best = int(np.argmax(values))
     return _PARTS[best] if values[best] > -_NEAR * max(abs(before.value(test)), abs(trial.value(test))) else 0.0
 
 
-def _level(slopes: Array, x: Array, part: float) -> float:
-    """Return by how much a number changes where the unknowns change by a ``part`` of 1 + their size."""
-    return part * float(np.abs(slopes) @ (1 + np.abs(x))) + TINY
+@functools.lru_cache(maxsize=1)
+def _inside(before: Trial, trial: Trial) -> list[Trial]:
+    """Return the cubic through both ends of a step at some parts of it."""
+    ahead = trial.x - before.x
+    length = np.sqrt(inner(trial.system, ahead, ahead))
+    a, b = length * before.tangent, length * trial.tangent
+    cubic = (before.x + s * (a + s * (3 * ahead - 2 * a - b + s * (a + b - 2 * ahead))) for s in _PARTS)
+    return [Trial.without_tangent(trial.system, x) for x in cubic]
 
 
-def with_outcomes(system: Discretization, x: Array, forced: Mapping[int, float] = MappingProxyType({})) -> Discretization:
+def _level(slopes: Array, x: Array, part: float) -> Any:
+    """Return by how much numbers change where the unknowns change by a ``part`` of 1 + their size."""
+    return part * np.abs(slopes) @ (1 + np.abs(x)) + TINY
+
+
+def with_outcomes(system: Any, x: Array, forced: Mapping[int, float] = MappingProxyType({})) -> Any:
     """Return a system with the outcomes at x, some of them forced; later ones may depend on those before."""
-    sides = np.ones(len(system.conditions))
-    for k in range(len(sides)):
-        found = system.with_sides(sides.copy())
-        sides[k] = forced.get(k) or (1.0 if found.numbers(x)[0][k] >= 0 else -1.0)
-    return system.with_sides(sides) if len(sides) else system
+    sides = np.ones(system.conditions)
+    for _ in sides:  # one round more of conditions is right each time
+        found = system.with_sides(sides)
+        before, sides = sides, np.where(found.numbers(x)[0] >= 0, 1.0, -1.0)
+        sides[list(forced)] = list(forced.values())
+        if np.array_equal(sides, before):
+            break
+    return system.with_sides(sides)
 
 
-def zeros(system: Discretization, x: Array) -> list[int]:
+@functools.lru_cache(maxsize=2)
+def refrozen(trial: Trial) -> Any:
+    """Return the system with the outcomes at a point beyond some; None where the equations have other values with them.
+
+    They have the same where two formulas for one function are joined, as a quotient and a series where it is 0 / 0.
+    """
+    system, x = trial.system, trial.x
+    there = with_outcomes(system, x)
+    ours, theirs = system.slopes(x), there.slopes(x)
+    level = _level(np.abs(theirs).max(axis=0), x, CERTAIN * CORRECTED)
+    same = np.abs(there.residual(x)).max() <= level and np.abs(theirs - ours).max() <= LOCATED * np.abs(theirs).max()
+    return there if same else None
+
+
+def zeros(system: Any, x: Array) -> list[int]:
     """Return the conditions whose numbers are zero at x, and change beside it."""
     values, slopes = system.numbers(x)
-    return [k for k, value in enumerate(values) if abs(value) <= _level(slopes[k], x, LOCATED) and slopes[k].any()]
+    return np.flatnonzero((np.abs(values) <= _level(slopes, x, LOCATED)) & slopes.any(axis=1)).tolist()
 
 
-def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
+def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
     """Return the ways that leave x with any outcomes of conditions, why some have none, and whether slopes jump."""
-    found, missing, slopes = list[Way](), "", list[Any]()
+    found, missing, slopes, noise = list[Way](), "", list[Array](), 0.0
+    random = draws.generator("corner")
     held, few = system.sides[list(zero)], len(zero) <= _MOST
     for sides in (
         itertools.product((1.0, -1.0), repeat=len(zero)) if few else (held, -held, *held * (1 - 2 * np.eye(len(zero))))
@@ -162,14 +189,16 @@ def ways(system: Discretization, x: Array, zero: Sequence[int]) -> tuple[list[Wa
             if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
                 missing = "the equations jump"
                 continue
+            moved = [there.slopes(draws.rounded(random, x)) for _ in range(draws.DRAWS)]
             slopes.append(jacobian)
+            noise = np.maximum(noise, np.abs(np.array(moved) - jacobian).max(axis=0))
             tangents = _tangents(there, x)
         rates = np.array(sides)[:, None] * there.numbers(x)[1][list(zero)]
         still = LOCATED * np.linalg.norm(rates, axis=1)
         for tangent in tangents:
             if np.all(rates @ tangent >= -still) and not any(np.abs(tangent - way.tangent).max() < DOUBLED for way in found):
                 found.append(Way(there, tangent))
-    bends = any(np.abs(each - slopes[0]).max() > LOCATED * np.abs(slopes[0]).max() for each in slopes[1:])
+    bends = any(np.any(np.abs(each - slopes[0]) > CERTAIN * noise + LOCATED * np.abs(each).max()) for each in slopes[1:])
     return found, missing, bends
 
 
@@ -179,7 +208,7 @@ def _beside(x: Array, part: float) -> Array:
     return np.array([x + step, x - step])
 
 
-def _tangents(system: Discretization, x: Array) -> list[Array]:
+def _tangents(system: Any, x: Array) -> list[Array]:
     """Return the unit tangents at x, both ways; where two branches cross with these outcomes, those of both."""
     slopes = [each for each in map(system.slopes, (x, *_beside(x, ROUGH))) if np.isfinite(each).all()]
     if np.linalg.svd(slopes[0], compute_uv=False)[-1] > LOCATED * max(np.linalg.norm(each) for each in slopes):
@@ -213,12 +242,12 @@ def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple
     kind = "several" if len(leading) > 1 else kind
     unstable = [each.unstable(x) for each in (system, *(way.system for way in leading[:1]))]
     found = Corner(kind, tuple(way.tangent for way in leading), (unstable[0], unstable[-1]))
-    name = f"{' and '.join(system.conditions[k] for k in zero)}: {kind}"
+    name = f"{' and '.join(system.written(k) for k in zero)}: {kind}"
     there = Trial(system, x, Linearization(came, point.trial.sign))
     return replace(point, trial=there, name=name, stop=None, details=found), leading
 
 
-def _polished(system: Discretization, x: Array, hit: int) -> Array:
+def _polished(system: Any, x: Array, hit: int) -> Array:
     """Return the point at which a number is zero."""
     for _ in range(2):
         values, slopes = system.numbers(x)

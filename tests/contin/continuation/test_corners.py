@@ -45,7 +45,11 @@ def test_smooth_conditions_and_conditions_that_stay_zero_are_passed_in_silence()
     def sinc(x):
         return np.sin(x) / x if abs(x) > 1e-3 else 1 - x**2 / 6 + x**4 / 120
 
-    for residual in (lambda u, p: (sinc(u.x) * u.x - p.a,), lambda u, p: (u.x + max(0, u.x) ** 2 - p.a,)):
+    def rate(x):  # its slope right beside the guard has an error of a hundredth, as terms cancel
+        return x / (1 - np.exp(-x / 10)) if abs(x) > 1e-6 else 10 + x / 2
+
+    smooth = [lambda u, p: (sinc(u.x) * u.x - p.a,), lambda u, p: (u.x + max(0, u.x) ** 2 - p.a,)]
+    for residual in (*smooth, lambda u, p: (rate(u.x) - 10 + u.x / 2 - p.a,)):
         branch = followed(residual, ["x"], -0.5, [-0.5], -0.6, 0.6)
         assert not branch.labelled("BC") and branch.points[-1]["a"] == 0.6 and not branch.notes
     spring = AlgebraicProblem(lambda u, p: (u.v, p.m * u.v - abs(u.v) * u.v - u.x), ["x", "v"], {"m": -1.0})
