@@ -1,11 +1,7 @@
 """Corners and jumps of functions: the conditions, where a solution meets them, and what they cost on its mesh.
 
-Where recorded functions have jumps and corners: conditions, and what the functions would be with their other outcome.
-
 A condition on time alone (``t < 0.4``, ``max(0, t - 1)``, a table of time) switches at known times. A condition on states or on
 free parameters (``u.x > 0.3``, ``abs(u.x)``) is a selection: it switches where the solution goes.
-
-Corners and jumps that a solution decides, as ``max(0, u.x)`` does: where they are on it, and what they cost on its mesh.
 
 A condition switches at a time tau in an interval [a, b] of the mesh. The equations with either outcome are smooth; the gap is
 the difference of the two. A polynomial that follows one outcome over the whole interval misses the integral of the gap over the

@@ -204,8 +204,7 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
 
 def _beside(x: Array, part: float) -> Array:
     """Return two places on both sides of x, shape (2, size)."""
-    step = part * (1 + np.abs(x)) * np.sign(random_rows(1, x.size)[0])
-    return np.array([x + step, x - step])
+    return x + np.outer([1, -1], part * (1 + np.abs(x)) * np.sign(random_rows(1, x.size)[0]))
 
 
 def _tangents(system: Any, x: Array) -> list[Array]:
@@ -236,15 +235,15 @@ def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple
     leading = [every[number] for number in sorted(on, key=lambda number: -on[number]) if on[number] > APART - 1]
     if len(leading) == 1 and not (missing or bends):
         return None, leading
-    at = system.parameter_index(primary)
-    turns = len(leading) == 1 and leading[0].tangent[at] * came[at] < 0
+    turns = len(leading) == 1 and (leading[0].tangent * came)[system.parameter_index(primary)] < 0
     kind = "fold" if turns else "goes on" if leading else f"end, {missing or 'no way leads on'}"
     kind = "several" if len(leading) > 1 else kind
     unstable = [each.unstable(x) for each in (system, *(way.system for way in leading[:1]))]
     found = Corner(kind, tuple(way.tangent for way in leading), (unstable[0], unstable[-1]))
     name = f"{' and '.join(system.written(k) for k in zero)}: {kind}"
-    there = Trial(system, x, Linearization(came, point.trial.sign))
-    return replace(point, trial=there, name=name, stop=None, details=found), leading
+    return replace(
+        point, trial=Trial(system, x, Linearization(came, point.trial.sign)), name=name, stop=None, details=found
+    ), leading
 
 
 def _polished(system: Any, x: Array, hit: int) -> Array:

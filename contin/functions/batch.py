@@ -5,8 +5,6 @@ Users' functions that cannot be recorded, evaluated in Python: values and deriva
 A function that takes arrays of places instead of numbers is called once for all of them. Derivatives are differences with an
 estimated error.
 
-A user's functions evaluated at many points in one call, with exact derivatives.
-
 The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter.
 What cannot be recorded is evaluated in Python, with a warning. Both answer the same `Request`.
 """
