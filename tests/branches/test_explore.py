@@ -292,6 +292,7 @@ def test_bad_input_is_one_sentence(what, results, tmp_path, capsys, request):
         out = tmp_path / ("page.pdf" if what == "page" else "folder.html")
         if what == "folder":
             out.mkdir()
+    capsys.readouterr()  # what computing the results has printed
     assert main([str(given), "--out", str(out)]) == 2
     printed = capsys.readouterr()
     assert printed.out == "" and printed.err.startswith("error: ") and printed.err.count("\n") == 1
