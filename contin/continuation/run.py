@@ -258,7 +258,7 @@ class Continuation:
         came = came if np.isfinite(came).all() else state.tangent
         corner, ways = corner_at(point, came, self._conditions.index(point.test), self.primary)
         if corner is not None:
-            self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=point.test.name)
+            self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=corner.name)
             yield self._point(corner, state, accuracy=self._accuracy)
         if ways:
             at, accepted = corner or point, state.accepted + 1

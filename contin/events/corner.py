@@ -183,7 +183,7 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
         there = with_outcomes(system, x, dict(zip(zero, sides)))
         with np.errstate(all="ignore"):
             jacobian = there.slopes(x)
-            if not all(np.isfinite(there.slopes(place)).all() for place in (x, *_beside(x, LOCATED))):
+            if not all(np.isfinite(each).all() for each in (jacobian, *map(there.slopes, _beside(x, LOCATED)))):
                 missing = "derivatives are not finite"  # as those of a root that begins there
                 continue
             if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):

@@ -286,7 +286,7 @@ def _is_plain(system: System) -> bool:
 def dependence(system: System, x: Array) -> str:
     """Return which conditions of a boundary value problem follow from others or contradict them, as a sentence; or ""."""
     if isinstance(system.problem, (CycleProblem, ConnectionProblem)):
-        return _of_orbit(system, x)
+        return _of_orbit(system, x, _rank(system, x))
     rank = _rank(system, x) if _is_plain(system) else None
     if rank is None:
         return ""
@@ -306,15 +306,14 @@ def of_family(system: System, x: Array) -> str:
     Newton's method would choose one of them by round-off, or lead to an equilibrium.
     """
     rank = _rank(system, x) if isinstance(system.problem, (CycleProblem, ConnectionProblem)) else None
-    return _of_orbit(system, x) if rank is not None and rank.null.size else ""
+    return _of_orbit(system, x, rank) if rank is not None and rank.null.size else ""
 
 
-def _of_orbit(system: System, x: Array) -> str:
+def _of_orbit(system: System, x: Array, rank: _Rank | None) -> str:
     """Return why a cycle or connecting orbit near x is not determined, as a sentence; or ""."""
     idle = [name for name in system.free if not system.parameter_columns(x, (name,)).any()]
     if idle:
         return f"free: {checks.listed(idle)} changes nothing in the equations: free a parameter that the orbit depends on"
-    rank = _rank(system, x)
     if rank is None:
         return ""
     z = _nearest(system, x, rank._replace(null=np.union1d(rank.null, len(rank.left) - 1)))

@@ -35,6 +35,7 @@ def test_a_branch_turns_or_goes_on_at_a_corner():
 def test_a_branch_ends_where_the_equations_jump_or_have_no_slope():
     branch = followed(lambda u, p: (u.x + (1.0 if u.x > 1 else 0.0) - p.a,), ["x"], 0.5, [0.5], -1, 4)
     assert corners(branch) == [(1, "end, the equations jump")] and "the equations jump" in str(branch.stop)
+    assert branch.stop.event == branch[-1].name
     branch = followed(lambda u, p: (u.x - p.a + max(u.x, 0) ** 0.5,), ["x"], -1.0, [-1.0], -1, 1)
     assert corners(branch) == [(0, "end, derivatives are not finite")]
 
