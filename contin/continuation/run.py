@@ -24,7 +24,7 @@ from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
 from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told
 from contin.continuation.rules import NOISY
-from contin.continuation.steps import Judge, Step, Steps
+from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
@@ -35,6 +35,7 @@ from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.corner import conditions, corner_at, refrozen
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
+from contin.events.watch import Watch
 from contin.levels import APART, ROUGH
 from contin.results.point import Point
 from contin.text import exact_text
@@ -99,7 +100,7 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
-        self._judge = Judge(self.start, settings, self._tests, general, self._steps.fold, self._steps.sense)
+        self._watch = Watch(self.start, settings, self._tests, general, self._steps.fold)
         if state is None:
             self._notes.check_phases(self.here())
         self._handed: Handed | None = None  # the next step, where a kernel has made it
@@ -204,7 +205,7 @@ class Continuation:
 
     def ends_inside(self, arc: Arc) -> bool:
         """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted."""
-        return self._judge.ends_inside(arc)
+        return self._watch.ends_inside(arc)
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
@@ -213,7 +214,7 @@ class Continuation:
             step = self._step(self.state)
         except ConvergenceError as error:
             here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
-            failed = met(self._judge.ends, here, first) or no_convergence(self.state, self.settings, error)
+            failed = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
             stop = self.state.system.explained(failed, here)
             if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
                 return
@@ -227,9 +228,9 @@ class Continuation:
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
-        changes = index_changes(self._judge.index, arc, found, self._notes)
+        changes = index_changes(self._watch.index, arc, found, self._notes)
         if end == len(special):
-            self._notes.doubts(self._judge.index, arc, found, step.doubt if len(found) == len(special) else "")
+            self._notes.doubts(self._watch.index, arc, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
             if point.test in self._conditions:
                 yield from self._turn(point, arc)
@@ -293,13 +294,13 @@ class Continuation:
         while True:
             try:
                 arc, judgement = self._meshes.good_step(self, step, made)
-                inspection = self._judge.inspection(arc, settings)
-                if not self._judge.asks(inspection):
+                inspection = self._watch.inspection(arc)
+                if not self._watch.asks(inspection):
                     return Step(arc, judgement)
-                doubt = self._judge.doubt(inspection)
+                doubt = self._watch.doubt(inspection)
                 if step < 2 * finest or not doubt:
-                    special = inspection.special_points(self._tests)  # where these cannot be found the step is halved
-                    return Step(arc, judgement, special, inspection.turns, doubt)
+                    special = inspection.special_points  # where these cannot be found the step is halved
+                    return Step(arc, judgement, special, bool(inspection.folds), doubt)
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
@@ -320,4 +321,4 @@ class Continuation:
             accuracy = self._accuracy
         if found.label != Label.BRANCH_POINT and found.label:  # branch points are asked before
             self._notes.phases(found, accuracy.error)
-        return told(found, state.arclength + found.at, self._judge.index, change, accuracy.error)
+        return told(found, state.arclength + found.at, self._watch.index, change, accuracy.error)

@@ -1,4 +1,4 @@
-"""What lies inside a step: the test functions that are asked, the points found, and steps that jump to another branch.
+"""The special points inside a step, and where a branch ends by itself.
 
 The quantity that vanishes on a trivial branch (``settings.trivial``): its round-off, and what its values at two points say.
 
@@ -7,16 +7,8 @@ round-off, and its signs differ. Where it falls from well above its round-off to
 the trivial branch: the step is refused. Where it is round-off at the beginning already (it can decay along a branch that runs
 on, beside a homoclinic orbit), its sign says nothing.
 
-Inspection of a step: does it stay on its branch, and which special points does it pass?
-
 In order: the end on the trivial branch, or a branch point, or several; zeros of the test functions, looked for between the
 folds; the folds; the end of a closed branch. What was located is sorted by its distance along the step.
-
-The watch list of a run: what both ends of a step say of special points inside it, and of whether it stays on its branch.
-
-It is made when a run begins. Each entry compares numbers of both ends, and asks for a closer look at the step
-where something may happen in between. A step for which no entry asks is plain: nothing else is
-computed of it.
 """
 
 from __future__ import annotations
@@ -25,7 +17,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,11 +28,11 @@ from contin.core.newton import Newton
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.step import Reason, Stop
-from contin.core.trial import Event, Linearization, Trial, same_sign, sign_changed
+from contin.core.trial import Event, Linearization, Trial, sign_changed
 from contin.events.arc import Arc, Place, SpecialPoint, stop_of
 from contin.events.branch_points import BranchPointSearch
 from contin.events.dips import separated
-from contin.events.folds import FoldSearch, may_turn
+from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
 from contin.functions.kernel_parts import helper
 from contin.levels import APART, BESIDE, CERTAIN, CORRECTED, DEPENDENT, DOUBLED, ROUGH, ROUND_OFF
@@ -79,8 +71,7 @@ def crossed(before: Trial, trial: Trial, name: str, newton: Newton) -> bool:
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
-#: What a note says of a step that no shorter one explains, and what may help.
-_STRAYS = "the determinant changes its sign, and no branch point was found"
+#: What may help where a step stays unexplained.
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
 FEWEST = 3
@@ -97,96 +88,58 @@ _EXPLAINED = 2.0
 Start = tuple[Discretization, Array, Array]
 
 
-class Inspection:
-    """The inspection of one step.
+class Sought(NamedTuple):
+    """What a run looks for.
 
-    Parameters
+    Attributes
     ----------
-    arc : Arc
     settings : Settings
+        Those that it begins with.
     start : tuple (system, x, tangent)
-        The first point of the run, to recognise a closed branch.
-    fold : Event, optional
+        Its first point, to recognise a closed branch.
+    tests : sequence of Event
+    fold : Event or None
         The tangent's component of the primary parameter; None where folds are not looked for.
+    ends : sequence of callables
+        ``end(inspection)``: the end of the branch inside a step that it knows of, or None.
     """
 
-    def __init__(self, arc: Arc, settings: Settings, start: Start, fold: Event | None) -> None:
-        self.arc, self.settings, self.start, self.fold = arc, settings, start, fold
+    settings: Settings
+    start: Start
+    tests: Sequence[Event]
+    fold: Event | None
+    ends: Sequence[Callable[[Inspection], SpecialPoint | None]]
+
+
+class Inspection:
+    """The inspection of one step; what is looked for is found once."""
+
+    def __init__(self, arc: Arc, sought: Sought) -> None:
+        self.arc, self.sought = arc, sought
         self.branch_points = BranchPointSearch(arc)
-        self._found: list[SpecialPoint] | None = None
-
-    # --- does the step stay on its branch? -----------------------------------------------------------------------
-
-    def doubt(self) -> str:
-        """Return why the step may have left its branch, or passes more than one point where branches cross; "" where not.
-
-        A change of the determinant's sign without a branch point means that Newton's method left the branch; so does one of the
-        trivial quantity without a zero of it on the branch.
-        """
-        if self._own_home is not None:
-            return ""  # the equations are singular there, and what they say of other points is blurred
-        count, clear = self.branch_points.count if self.settings.branch_points else (0, True)
-        if not clear:
-            return "the linearized equations come close to singular: branch points may have been passed"
-        if self._home is not None and not self._home.is_located:
-            return f"{self.settings.trivial} changes its sign, and no zero of it was found on the branch"
-        if not self.settings.branch_points:
-            return ""
-        if count > 1:
-            located, what = self.branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
-        else:
-            located = not self.branch_points.sign_changes or self.branch_points.simple.is_located
-            what = _STRAYS
-        return "" if located else what
-
-    def strays(self, tests: Iterable[Event]) -> str:
-        """Return why the step may have left its branch by its folds and, where branch points are not looked for, by its sign.
-
-        Where the parameter turns on the branch, a fold is located. The determinant changes its sign where branches cross,
-        labelled or not, and where a kind of problem knows its equations to be singular. Otherwise Newton's method left the
-        branch: another arm of it beside a fold is passed the other way.
-        """
-        primary: Any = self.fold and self.fold.name
-        for point in self.special_points(tests) if self._folds else []:
-            if point.stop is not None:
-                break  # what lies beyond the end of the run is none of its branch
-            if not point.is_located and any(point is fold for fold in self._folds):
-                return f"{primary} turns, and no fold was found on the branch"
-        if self.settings.branch_points or self._own_home is not None or not self.branch_points.sign_changes:
-            return ""
-        for point in self.special_points(tests):
-            ends = point.stop is not None and not (point.test is not None and point.test.limit)
-            if point.is_located and (point.label == Label.BRANCH_POINT or ends):
-                return ""
-        return "" if self.branch_points.simple.is_located else _STRAYS
 
     # --- special points ------------------------------------------------------------------------------------------
 
-    def special_points(self, tests: Iterable[Event]) -> list[SpecialPoint]:
-        """Return the special points inside the step, in order; they are looked for once.
+    @functools.cached_property
+    def special_points(self) -> list[SpecialPoint]:
+        """The special points inside the step, in order.
 
         Raises
         ------
         ConvergenceError
             A point inside the step that is needed to tell is not found.
         """
-        if self._found is None:
-            self._found = self._searched(tests)
-        return self._found
-
-    def _searched(self, tests: Iterable[Event]) -> list[SpecialPoint]:
         found: list[SpecialPoint] = []
-        home = self._home
-        if home is not None:
-            found.append(home)
-        elif self.settings.branch_points and self.branch_points.count[0] > 1:
+        if self.home is not None:
+            found.append(self.home)
+        elif self.sought.settings.branch_points and self.branch_points.count[0] > 1:
             found.append(self.branch_points.multiple)
-        elif self.settings.branch_points and self.branch_points.sign_changes:
+        elif self.sought.settings.branch_points and self.branch_points.sign_changes:
             found.append(self.branch_points.simple)
         crossings = [point for point in found if point.is_located]
-        for test in tests:
+        for test in self.sought.tests:
             found += self._zeros(test, crossings)
-        found += [fold for fold in self._folds if not self._same_place(fold, found)]
+        found += [fold for fold in self.folds if not self._same_place(fold, found)]
         found = [point for point in found if not self._at_the_start(point)]
         closed = self._closed()
         if closed is not None:
@@ -202,21 +155,16 @@ class Inspection:
     # --- folds ---------------------------------------------------------------------------------------------------
 
     @functools.cached_property
-    def _folds(self) -> list[SpecialPoint]:
-        """Folds with respect to the primary parameter, in order."""
-        return [] if self.fold is None else FoldSearch(self.arc, self.fold, self._pitchfork).find()
-
-    @property
-    def turns(self) -> bool:
-        """The primary parameter turns inside the step, be it where branches cross."""
-        return bool(self._folds)
+    def folds(self) -> list[SpecialPoint]:
+        """Places where the primary parameter turns, in order, be it where branches cross."""
+        return [] if self.sought.fold is None else FoldSearch(self.arc, self.sought.fold, self._pitchfork).find()
 
     def _pitchfork(self) -> SpecialPoint | None:
         """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
-        fold: Any = self.fold
-        if self._home is not None:
-            found = dataclasses.replace(self._home, stop=None)
-        elif self.settings.branch_points and self.branch_points.sign_changes:
+        fold: Any = self.sought.fold
+        if self.home is not None:
+            found = dataclasses.replace(self.home, stop=None)
+        elif self.sought.settings.branch_points and self.branch_points.sign_changes:
             found = self.branch_points.simple
         else:
             return None
@@ -238,7 +186,7 @@ class Inspection:
             if points is not None:
                 return points
         state = self.arc.state
-        same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
+        same = [point for point in (*self.folds, *crossings) if self._coincides(test, point)]
         found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
         for left, right in self._pieces(test, same):
             before, after = left[1].value(test), right[1].value(test)
@@ -293,34 +241,28 @@ class Inspection:
     def _knots(self) -> list[Place]:
         """Return places, each behind the one before, between which a test function has one zero at most, if all is seen."""
         arc = self.arc
-        folds = [(fold.at, fold.trial) for fold in self._folds if 0 < fold.at < arc.step]
+        folds = [(fold.at, fold.trial) for fold in self.folds if 0 < fold.at < arc.step]
         return [(0.0, arc.beginning()), *folds, (arc.step, arc.trial)]
 
     # --- ends ----------------------------------------------------------------------------------------------------
 
     @functools.cached_property
-    def _own_home(self) -> SpecialPoint | None:
-        """The end of the branch that the kind of problem knows."""
-        return self.arc.trial.system.home(self.arc)
+    def home(self) -> SpecialPoint | None:
+        """The end of the branch inside the step."""
+        return next((end for known in self.sought.ends if (end := known(self)) is not None), None)
 
-    @functools.cached_property
-    def _home(self) -> SpecialPoint | None:
-        """The end of a branch inside the step."""
-        return self._trivial_end if self._own_home is None else self._own_home
-
-    @functools.cached_property
-    def _trivial_end(self) -> SpecialPoint | None:
+    def trivial_end(self) -> SpecialPoint | None:
         """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; not located without a zero there.
 
         It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
         cubic through both ends of the step: elsewhere it belongs to another branch.
         """
-        arc, name = self.arc, self.settings.trivial
+        arc, name = self.arc, self.sought.settings.trivial
         before, trial = arc.before, arc.trial
         if name is None or not crossed(before, trial, name, arc.newton):
             return None
         stop = Stop(Reason.TRIVIAL_BRANCH, f"returned to the trivial branch ({name} = 0)")
-        if not self.settings.branch_points or self.branch_points.sign_changes:
+        if not self.sought.settings.branch_points or self.branch_points.sign_changes:
             point = self.branch_points.simple
             if self._is_home(point):
                 return dataclasses.replace(point, label=Label.END, name="trivial branch", stop=stop)
@@ -333,7 +275,7 @@ class Inspection:
 
     def _is_home(self, point: SpecialPoint) -> bool:
         """Return whether the trivial quantity vanishes at a point on the branch."""
-        arc, name = self.arc, self.settings.trivial
+        arc, name = self.arc, self.sought.settings.trivial
         assert name is not None
         zero = max(APART * max(abs(arc.before[name]), abs(arc.trial[name])), round_off(point.trial, name, arc.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
@@ -347,7 +289,7 @@ class Inspection:
     @functools.cached_property
     def _returned(self) -> Returned | None:
         arc = self.arc
-        return returned(self.start, arc.beginning(), arc.trial, arc.step)
+        return returned(self.sought.start, arc.beginning(), arc.trial, arc.step)
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
@@ -365,7 +307,7 @@ class Inspection:
 
         Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
         """
-        others = [other for other in found if other.label in SINGULAR or other is self._home or other.turns_back]
+        others = [other for other in found if other.label in SINGULAR or other is self.home or other.turns_back]
         if not others:
             return False
         if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
@@ -461,89 +403,3 @@ def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
     group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
     place = {id(point): number for point, number in zip(order, group)}
     return sorted(points, key=lambda point: (place[id(point)], point.test is not None and point.test.label != Label.FOLD))
-
-
-#: Returns whether a step wants a closer look.
-Entry = Callable[[Inspection], bool]
-
-
-def watch_list(
-    system: Discretization, settings: Settings, tests: Sequence[Event], fold: Event | None, index: Event | None
-) -> list[Entry]:
-    """Return the entries of a run; each returns whether it asks for a closer look at a step.
-
-    Parameters
-    ----------
-    system : Discretization
-        Of the first point; others of the run have the same free parameters.
-    settings : Settings
-    tests : sequence of Event
-    fold, index : Event, optional
-        The rate of the primary parameter, and the index of a variational problem.
-    """
-    held = [test for test in tests if test.holds_one_of(system.free)]
-    entries: list[Entry] = [_determinant(settings.branch_points), Inspection.may_close]
-    entries += [_value(system.free.index(test.column), test) for test in held]
-    entries += [_sign(test) for test in tests if test not in held]
-    if fold is not None:
-        entries.append(lambda inspection: may_turn(inspection.arc, fold))
-    if settings.trivial is not None:
-        entries.append(_trivial(settings.trivial))
-    if index is not None:
-        entries.append(_changed(index))
-    if system.size_of_solutions is not None:
-        entries.append(_sign(system.size_of_solutions))
-    return entries
-
-
-def _determinant(counts: bool) -> Entry:
-    """That of the determinant's sign and, where branch points are looked for, of singular values that come near zero."""
-
-    def asks(inspection: Inspection) -> bool:
-        before, trial = inspection.arc.before, inspection.arc.trial
-        return not same_sign(before.sign, trial.sign) or (counts and inspection.branch_points.count != (0, True))
-
-    return asks
-
-
-def _value(place: int, test: Event) -> Entry:
-    """That of a value of a free parameter, the one at this place."""
-    value = test.value
-    assert value is not None
-
-    def asks(inspection: Inspection) -> bool:
-        before, trial = inspection.arc.before, inspection.arc.trial
-        system = trial.system
-        at, size = system.state_size + place, system.free_scales[place]
-        first, last = before.x[at] * size - value, trial.x[at] * size - value
-        same = first < 0 > last or first > 0 < last
-        return not same or (test.limit and trial.value(test) >= 0)
-
-    return asks
-
-
-def _sign(test: Event) -> Entry:
-    """That of a test function: what it says of a step itself or, where it has nothing to say, the signs at both ends."""
-
-    def asks(inspection: Inspection) -> bool:
-        arc = inspection.arc
-        if test.asks is not None:
-            return test.asks(arc)
-        return test.search is not None or bool(test.looks) or arc.passes(test)
-
-    return asks
-
-
-def _trivial(name: str) -> Entry:
-    def asks(inspection: Inspection) -> bool:
-        arc = inspection.arc
-        return crossed(arc.before, arc.trial, name, arc.newton)
-
-    return asks
-
-
-def _changed(index: Event) -> Entry:
-    def asks(inspection: Inspection) -> bool:
-        return abs(inspection.arc.before.value(index) - inspection.arc.trial.value(index)) > 0
-
-    return asks
