@@ -17,9 +17,10 @@ from contin.collocation.projection import Projections, fill_projections
 from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.linalg import convergence
 from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.condensation import Factored, solve
-from contin.linalg.convergence import CHORDS, diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
+from contin.linalg.convergence import CHORDS, judge_update, subtract
 from contin.linalg.elimination import factorize
 
 
@@ -219,7 +220,7 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
 @helper
 def _iterate(codes, mesh, room, matrix, x, control, report):
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
-    before, size, moved, fresh, tolerance = math.inf, math.inf, 1.0, True, control.tolerance
+    before, size, moved, fresh = math.inf, math.inf, 1.0, True
     for number in range(control.most):
         if not _evaluate(codes, mesh, room, x, fresh):
             return STAGNATES
@@ -229,18 +230,14 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
         _solve(mesh, room, matrix)
         before, size = size, subtract(x, room.update[0])
         report[ITERATIONS], report[UPDATES + number] = number + 1, size
-        if not size < math.inf:
-            return FAILED
-        moved = size if fresh else moved + size
-        rate = estimated_rate(size, before, moved, fresh)
-        report[ERROR] = size * rate
-        if has_converged(size, rate, number + 1, tolerance):
+        said, report[ERROR], moved = judge_update(size, before, moved, number + 1, fresh, control.tolerance)
+        if said == convergence.CONVERGED:
             return RIGHT if fresh and size <= RIGHT_THERE else CONVERGED
-        if stagnates(size, rate, number + 1):
+        if said == convergence.STAGNATES:
             return STAGNATES
-        if number > 1 and diverges(size, before):
+        if said == convergence.DIVERGES:
             return FAILED
-        fresh = wants_jacobian(size, rate, tolerance)
+        fresh = said == convergence.FRESH
     return FAILED
 
 

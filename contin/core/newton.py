@@ -23,7 +23,7 @@ from contin.errors import ConvergenceError
 from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.convergence import CHORDS, diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
+from contin.linalg.convergence import CHORD, CHORDS, CONVERGED, DIVERGES, STAGNATES, judge_update, subtract
 from contin.text import shown
 
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
@@ -194,10 +194,10 @@ def _newton(
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
-    x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
+    x, updates, before, moved = np.array(guess, dtype=float), list[float](), math.inf, 1.0
     factors: Factors | None = None
     with np.errstate(all="ignore"):
-        for _ in range(newton.max_iterations):
+        for number in range(1, newton.max_iterations + 1):
             fresh = factors is None
             if factors is None:
                 residual, factors = system.linearize(x, rows)
@@ -205,22 +205,22 @@ def _newton(
                 residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
             size = subtract(x, update)
-            if not math.isfinite(size):
+            said, error, moved = judge_update(size, before, moved, number, fresh, newton.tolerance)
+            updates += [size] if math.isfinite(size) else []
+            if said == DIVERGES:
                 break
-            progress.record(size, fresh)
-            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, LOCATED)):
+            if said == CONVERGED or (said == STAGNATES and _is_noise(system, x, update, rows, LOCATED)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
-                if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
-                    return Corrected(x, factors, len(progress.sizes), progress.error)
-                return _settled(system, x, row, target, newton, sizes, progress.sizes)
-            if progress.diverges:
-                break
-            if progress.wants_jacobian:
+                if sizes is None or relative * max(error / (size or 1.0), min(1.0, relative)) <= newton.tolerance:
+                    return Corrected(x, factors, number, error)
+                return _settled(system, x, row, target, newton, sizes, updates)
+            if said != CHORD:
                 factors = None
+            before = size
         coarse = ROUGH if sizes is not None else STAGNANT
         if size <= coarse and _is_noise(system, x, update, rows, coarse):
-            return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
-    raise _failure(progress.sizes)
+            return Corrected(x, system.linearize(x, rows)[1], len(updates), max(updates[-2:]))
+    raise _failure(updates)
 
 
 def _settled(
@@ -351,48 +351,6 @@ def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Ar
         change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
         noise = np.maximum(noise, np.abs(factors.solve(change)))
     return noise
-
-
-class _Progress:
-    """The sizes of the updates so far, and what they say of the error that is left."""
-
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance = tolerance
-        self.sizes: list[float] = []
-        self._moved = 1.0  # distance from where the Jacobian was taken
-        self.rate = 1.0  # estimated ratio of the error after the last update to its size
-
-    def record(self, size: float, fresh: bool) -> None:
-        """Note an update, made with a ``fresh`` Jacobian or with an old one."""
-        self.sizes.append(size)
-        self._moved = size if fresh else self._moved + size
-        before = self.sizes[-2] if len(self.sizes) > 1 else math.inf
-        self.rate = estimated_rate(size, before, self._moved, fresh)
-
-    @property
-    def error(self) -> float:
-        """Estimated error after the last update."""
-        return self.sizes[-1] * self.rate
-
-    @property
-    def converged(self) -> bool:
-        """The error is below the tolerance."""
-        return has_converged(self.sizes[-1], self.rate, len(self.sizes), self.tolerance)
-
-    @property
-    def stagnates(self) -> bool:
-        """Small updates no longer shrink: they are round-off, or there is no solution and unknowns are smaller still."""
-        return stagnates(self.sizes[-1], self.rate, len(self.sizes))
-
-    @property
-    def diverges(self) -> bool:
-        """The last update is more than twice the one before."""
-        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2])
-
-    @property
-    def wants_jacobian(self) -> bool:
-        """The next update is better made with a new Jacobian: chord steps would take longer."""
-        return wants_jacobian(self.sizes[-1], self.rate, self.tolerance)
 
 
 def _chords(

@@ -18,7 +18,8 @@ from contin.functions.batch import Batch
 from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
-from contin.linalg.convergence import diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
+from contin.linalg import convergence
+from contin.linalg.convergence import judge_update, subtract
 from contin.linalg.small import factor_small, solve_small
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
@@ -196,18 +197,15 @@ def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, 
         linear.update[size - 1] = missing
         solve_small(linear.lu, linear.exchanges, linear.update)
         now = subtract(x, linear.update)
-        if not now < math.inf:
-            return FAILED
-        moved = now if fresh else moved + now
-        rate = estimated_rate(now, before, moved, fresh)
-        if has_converged(now, rate, number, tolerance):
-            linear.found[UPDATES], linear.found[ERROR] = number, now * rate
+        said, error, moved = judge_update(now, before, moved, number, fresh, tolerance)
+        if said == convergence.CONVERGED:
+            linear.found[UPDATES], linear.found[ERROR] = number, error
             return BELIEVED
-        if stagnates(now, rate, number):
+        if said == convergence.STAGNATES:
             return ASKS
-        if number > 2 and diverges(now, before):
+        if said == convergence.DIVERGES:
             break
-        fresh, before = wants_jacobian(now, rate, tolerance), now
+        fresh, before = said == convergence.FRESH, now
     return ASKS if now <= STAGNANT else FAILED
 
 

@@ -31,29 +31,32 @@ def estimated_rate(size: float, before: float, moved: float, fresh: bool) -> flo
     return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
 
 
-@helper
-def has_converged(size: float, rate: float, updates: int, tolerance: float) -> bool:
-    """Return whether the error after so many updates is below the tolerance, and another update has confirmed that."""
-    return (updates > 1 or size <= tolerance) and size * rate <= tolerance
+#: What an update says: the error left is below the tolerance; updates that are small no longer shrink; they grow, or are not
+#: finite; the next one is better made with a new Jacobian; or with the one at hand.
+CONVERGED, STAGNATES, DIVERGES, FRESH, CHORD = range(5)
 
 
 @helper
-def stagnates(size: float, rate: float, updates: int) -> bool:
-    """Return whether small updates no longer shrink."""
-    return size < LOCATED and updates > 1 and rate >= 0.5
+def judge_update(
+    size: float, before: float, moved: float, number: int, fresh: bool, tolerance: float
+) -> tuple[int, float, float]:
+    """Return what an update says, the estimated error that it leaves, and the distance from where the Jacobian was taken.
 
-
-@helper
-def diverges(size: float, before: float) -> bool:
-    """Return whether an update is more than twice the one before."""
-    return size > 2 * before > LOCATED
-
-
-@helper
-def wants_jacobian(size: float, rate: float, tolerance: float) -> bool:
-    """Return whether the next update is better made with a new Jacobian."""
-    far = size > FAR or not rate < 0.5
-    return far or (rate > 0 and math.log(tolerance / size) < CHORDS * math.log(rate))
+    ``size`` is that of the update, ``before`` that of the one before, infinite without one, and ``number`` counts updates. The
+    Jacobian was taken ``moved`` before this update, or is its own, ``fresh``.
+    """
+    moved = size if fresh else moved + size
+    if not size < math.inf:
+        return DIVERGES, size, moved
+    rate = estimated_rate(size, before, moved, fresh)
+    if (number > 1 or size <= tolerance) and size * rate <= tolerance:  # another update has confirmed it
+        return CONVERGED, size * rate, moved
+    if size < LOCATED and number > 1 and rate >= 0.5:
+        return STAGNATES, size * rate, moved
+    if number > 2 and size > 2 * before > LOCATED:
+        return DIVERGES, size * rate, moved
+    slow = size > FAR or not rate < 0.5 or (rate > 0 and math.log(tolerance / size) < CHORDS * math.log(rate))
+    return FRESH if slow else CHORD, size * rate, moved
 
 
 @kernel(reorder=False)
