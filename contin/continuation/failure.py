@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from contin.continuation.points import Notes
+from contin.continuation.rules import aims, judged, predict
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
-from contin.core.step import Reason, State, Stop, aims, corrected, judged, predict
+from contin.core.step import Reason, State, Stop, corrected
 from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.draws import generator

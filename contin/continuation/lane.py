@@ -25,13 +25,12 @@ from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
-from contin.core.step import SUMS, State, aims
+from contin.core.step import State
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
 from contin.events.corner import comes_near
 from contin.events.crossings import changes_little
-from contin.events.folds import STILL
 from contin.events.inspection import Start, crossed, free_of, jumped, returned
 from contin.events.spectra import spectra_of
 from contin.linalg.condensation import Factored, Factorization
@@ -106,22 +105,14 @@ class Lane(ABC):
         self._handed: Handed | None = None
         self._others, self._index = others, system.index
         self._wants = bool(others) or system.index is not None or settings.trivial is not None
-        primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
-        newton, (angle, accuracy) = settings.newton, aims(settings, system)
-        self._frame = rules.Frame(system.weights, system.state_size, system.free_scales)
-        self._attempt = rules.Attempt(np.empty(system.size), np.empty(SUMS), np.zeros(rules.JUDGED))
-        self._control = rules.Control(
-            newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step,
-            primary, STILL if system.intervals else -1.0,
-        )  # fmt: skip
+        self._frame, self._control = rules.frame_of(system), rules.control_of(system, settings)
+        self._attempt = rules.attempt_of(system.size)
         held = [test for test in tests if test.holds_one_of(system.free)]
-        ends = np.array([settings.limits.get(name, (-np.inf, np.inf)) for name in system.free], dtype=float)
         sides = [(1.0 if test.value == settings.limits[test.column][1] else -1.0) if test.limit else 0.0 for test in held]
         self._watch = rules.Watch(
             int(settings.branch_points), int(any(self.knows(test) for test in tests)), int(noisy),
             np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
-            np.array([test.value for test in held], dtype=float), np.array(sides), ends[:, 0].copy(), ends[:, 1].copy(),
-            *self._home(),
+            np.array([test.value for test in held], dtype=float), np.array(sides), *self._home(),
         )  # fmt: skip
 
     @staticmethod
@@ -138,21 +129,14 @@ class Lane(ABC):
         """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
 
     @abstractmethod
-    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
+    def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
         """Make plain steps from row 1 of a path, the state's point ``here``."""
 
     def steps(self, state: State, most: int, here: Trial) -> Block:
         """Make plain steps from a state, no more than ``most``; ``here`` is its point."""
-        size = state.x.size
-        path = rules.Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.zeros((most + 2, rules.NUMBERS)))
-        bent = state.previous_tangent is not None
-        path.x[1], path.tangents[1] = state.x, state.tangent
-        path.tangents[0] = state.previous_tangent if bent else 0.0
-        path.numbers[1, : rules.MESH_ERROR + 1] = (
-            state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0, state.discretization_error,
-        )  # fmt: skip
+        path = rules.path_from(state, most)
         self._handed = None
-        return Block(self.system, state, path, self._make(path, state.accepted, int(bent), here), self._handed)
+        return Block(self.system, state, path, self._make(path, state.accepted, here), self._handed)
 
     def _trial(self, path: rules.Path, number: int, factors: Factorization | None = None) -> Trial:
         """Return the point of a row of a path, with factors right there if these are at hand."""
@@ -200,8 +184,8 @@ class SmallLane(Lane):
         circles = np.append(system.circles, np.zeros(system.size - system.state_size))
         return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
 
-    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
-        made, indices = int(plain_steps(self._rooms, path, accepted, bent)), list[int | None]()
+    def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
+        made, indices = int(plain_steps(self._rooms, path, accepted)), list[int | None]()
         if not (self._wants or path.numbers[2 : made + 2, rules.CLOSES].any()):
             return made, None
         for before, end in itertools.pairwise(self._trial(path, number) for number in range(1, made + 2)):
@@ -252,7 +236,7 @@ class MeshLane(Lane):
         home, x, _ = self._start
         return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
-    def _make(self, path: rules.Path, accepted: int, bent: int, here: Trial) -> _Made:
+    def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
         values, begun, indices = self._work.values, self._begun(path, here), list[int | None]()
         if begun is None:
             return 0, None
@@ -262,8 +246,7 @@ class MeshLane(Lane):
         poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
             now, after = 1 - now, self._factors[1 - now]
-            bend = 0.5 / path.numbers[number - 1, rules.STEP] if number > 2 or bent else 0.0
-            step = on_mesh.step_on_mesh(self._rooms[now], path, accepted, number, bend)
+            step = on_mesh.step_on_mesh(self._rooms[now], path, accepted, number)
             asks = step <= 0 or (self._still and on_mesh.rests(values.field, values.points.shape[1], self._still))
             if not asks:
                 found, clear = on_mesh.MAY_BRANCH, self._compared(after.room, 0)

@@ -14,11 +14,12 @@ import numpy as np
 from contin.arrays import Array
 from contin.collocation.mesh import MeshControl
 from contin.continuation.points import unsettled
+from contin.continuation.rules import Judgement
 from contin.continuation.scaling import outgrown
 from contin.continuation.steps import Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
-from contin.core.step import Judgement, State, trial_of
+from contin.core.step import State, trial_of
 from contin.core.trial import Event, Trial
 from contin.draws import generator
 from contin.errors import ConvergenceError

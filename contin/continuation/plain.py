@@ -48,11 +48,11 @@ class Rooms(NamedTuple):
 
 
 @helper
-def _attempted(rooms: Rooms, path: Path, number: int, bend: float, step: float) -> int:
-    """Make one step of a given length, as far as it can be believed by itself; ``bend`` is 0 at the first step."""
+def _attempted(rooms: Rooms, path: Path, number: int, step: float) -> int:
+    """Make one step of a given length, as far as it can be believed by itself."""
     equations, linear, frame, attempt, control, _, _, _ = rooms
     x, new, target = path.x[number - 1], path.x[number], step
-    rules.predict(attempt, path, number, bend, step)
+    rules.fill_guess(attempt, path, number, step)
     for i in range(x.size):
         target += linear.row[i] * x[i]
     outcome: int = small.correct_point(equations, linear, control.tolerance, control.most, new, target, path.tangents[number])
@@ -60,24 +60,24 @@ def _attempted(rooms: Rooms, path: Path, number: int, bend: float, step: float) 
         return outcome
     judged, found = attempt.judged, linear.found
     judged[rules.SIGN], judged[rules.UPDATES], judged[rules.ERROR] = found[small.SIGN], found[small.UPDATES], found[small.ERROR]
-    return rules.judge(frame, attempt, control, path, number, bend, step)
+    return rules.judge(frame, attempt, control, path, number, step)
 
 
 @helper
-def _made(rooms: Rooms, path: Path, number: int, bend: float) -> float:
+def _made(rooms: Rooms, path: Path, number: int) -> float:
     """Predict and correct, halving the step until its end can be believed; return its length, 0 where that is not decided."""
     x, largest = path.x[number - 1], 0.0
     for i in range(x.size):
         largest = max(largest, abs(x[i]))
     if not largest <= USUAL[1] and not rooms.equations.is_map:
         return 0.0  # sizes may grow
-    step = rules.first_length(rooms.frame, rooms.control, rooms.watch, path, number, bend)
+    step = rules.first_length(rooms.frame, rooms.control, path, number)
     while True:
-        outcome = _attempted(rooms, path, number, bend, step)
+        outcome = _attempted(rooms, path, number, step)
         if outcome == small.BELIEVED:
             return step
         step /= 2
-        if outcome != small.FAILED or step < rooms.control.shortest:
+        if outcome == small.ASKS or step < rooms.control.shortest:
             return 0.0
 
 
@@ -115,17 +115,17 @@ def _eigenvalues_ask(equations: Equations, attempt: Attempt, spectra: Spectra, p
     """Return whether eigenvalues, or multipliers of a map, ask for a closer look."""
     if fill_spectrum(equations, spectra, LAST):
         return True
-    rate = step / max(attempt.sums[1], LEAST_COSINE)
+    rate = step / max(attempt.judged[rules.COSINE], LEAST_COSINE)
     x, tangent, new, new_tangent = path.x[number - 1], path.tangents[number - 1], path.x[number], path.tangents[number]
     fill_cubic(spectra, x, tangent, new, new_tangent, step, rate)
     return may_double_or_twist(equations, spectra) if equations.is_map else may_pass_axis(equations, spectra)
 
 
 @kernel(reorder=False, last=True)
-def plain_steps(rooms: Rooms, path: Path, accepted: int, bent: int) -> int:
+def plain_steps(rooms: Rooms, path: Path, accepted: int) -> int:
     """Make plain steps from row 1 of the path, up to its end or the first step that asks; return how many.
 
-    ``accepted`` is the number of regular points up to row 1, ``bent`` 1 where row 0 has a tangent.
+    ``accepted`` is the number of regular points up to row 1.
     """
     equations, linear, frame, attempt, control, watch, quotient, spectra = rooms
     small.evaluate_slopes(equations, path.x[1])
@@ -134,8 +134,7 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int, bent: int) -> int:
         return 0
     rows: int = path.x.shape[0]
     for number in range(2, rows):
-        x, tangent, had, now = path.x[number - 1], path.tangents[number - 1], path.numbers[number - 1], path.numbers[number]
-        size = x.size
+        tangent, now, size = path.tangents[number - 1], path.numbers[number], path.x.shape[1]
         for i in range(size):
             linear.row[i] = frame.weights[i] * tangent[i]
         for i in range(size):
@@ -143,15 +142,14 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int, bent: int) -> int:
                 quotient.before[i, j] = linear.matrix[i, j] if i < size - 1 else linear.row[j]
         for i in range(spectra.real.shape[1]):
             spectra.real[FIRST, i], spectra.imaginary[FIRST, i] = spectra.real[LAST, i], spectra.imaginary[LAST, i]
-        bend = 0.5 / had[rules.STEP] if number > 2 or bent else 0.0
-        step = _made(rooms, path, number, bend)
+        step = _made(rooms, path, number)
         if step == 0.0 or rules.asks(frame, attempt, control, watch, path, accepted, number, step):
             return number - 2
         if now[rules.CLOSES] > 0 or (watch.branch_points and not _calm(linear, quotient)):
             return number - 2
         if watch.eigenvalues and _eigenvalues_ask(equations, attempt, spectra, path, number, step):
             return number - 2
-        rules.accept(frame, attempt, control, path, number, step, bend)
+        rules.accept(frame, attempt, control, path, number, step)
         if control.primary >= 0 and now[rules.SENSE] == 0.0:
             return number - 2
     return rows - 2

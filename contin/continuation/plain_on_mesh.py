@@ -65,11 +65,10 @@ class MeshRooms(NamedTuple):
 
 
 @kernel(reorder=False, last=True)
-def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend: float) -> float:
+def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> float:
     """Predict, correct and judge a step into row ``number`` of a path, halving it until it can be believed; accept it.
 
-    Return its length, negative where the watch list asks; 0 where it is not decided here. ``bend`` is 0 at the first step, else
-    half of what divides the change of tangents.
+    Return its length, negative where the watch list asks; 0 where it is not decided here.
     """
     work, factored, newton, report, amplitude, frame, attempt, control, watch = rooms
     values, weights = work.values, frame.weights
@@ -78,9 +77,9 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend:
     for i in range(x.size):
         row[i] = weights[i] * path.tangents[number - 1, i]
         start += row[i] * x[i]
-    step = rules.first_length(frame, control, watch, path, number, bend)
+    step = rules.first_length(frame, control, path, number)
     while True:
-        rules.predict(attempt, path, number, bend, step)
+        rules.fill_guess(attempt, path, number, step)
         values.targets[last] = start + step
         done, outcome = one_call.correct_on_mesh(work, factored, newton, new, weights, tangent, report), FAILED
         judged[rules.SIGN], judged[rules.UPDATES] = report[one_call.SIGN], report[one_call.ITERATIONS]
@@ -90,7 +89,7 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend:
         if done == one_call.FAILED and report[one_call.UPDATES + int(report[one_call.ITERATIONS]) - 1] <= STAGNANT:
             return 0.0
         if done == one_call.CONVERGED and not _has_collapsed(amplitude, x, new):
-            outcome = rules.judge(frame, attempt, control, path, number, bend, step)
+            outcome = rules.judge(frame, attempt, control, path, number, step)
         if outcome == BELIEVED:
             break
         step /= 2
@@ -100,7 +99,7 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend:
         return -step
     if amplitude.size > 0 and not _product(amplitude, new) > 0:
         return -step
-    rules.accept(frame, attempt, control, path, number, step, bend)
+    rules.accept(frame, attempt, control, path, number, step)
     return -step if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
 
 

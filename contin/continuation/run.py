@@ -23,12 +23,12 @@ from contin.continuation.first import begins_outside, corrected_first, frozen, o
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
 from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told
-from contin.continuation.rules import NOISY
+from contin.continuation.rules import NOISY, length_of, predict
 from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
-from contin.core.step import Reason, State, Stop, predict, up_to_limits
+from contin.core.step import Reason, State, Stop
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
@@ -289,7 +289,7 @@ class Continuation:
         """Predict and correct, halving the step until the corrected point can be believed."""
         settings, (step, _, made), self._handed = self.settings, self._handed or (0.0, None, None), None
         if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
-            step, made = up_to_limits(state, settings.limits, settings.min_step), None
+            step, made = length_of(state, settings), None
         finest = max(settings.min_step, ROUGH * step)
         while True:
             try:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from contin.arrays import Array
-from contin.core import step as core_step
+from contin.continuation.rules import JUMPS, Judgement, aims, judged, predict
 from contin.core.settings import Settings
-from contin.core.step import Judgement, State, aims, corrected, following_step, judged, predict
+from contin.core.small import ASKS, FAILED
+from contin.core.step import State, corrected, settled
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
@@ -75,38 +76,30 @@ class Steps:
         ConvergenceError
         """
         settings = self.settings
-        guess = predict(state, step)
+        guess = predict(state, step, settings)
         trial = made or corrected(state, guess, step, settings.newton)
         if state.system.collapsed(state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
-        judgement = judged(state, guess, trial)
-        angle, accuracy = aims(settings, state.system)
-        if not (judgement.turn <= angle and judgement.missed <= core_step.ASTRAY * accuracy * step):
+        judgement = judged(state, guess, trial, step, settings)
+        if judgement.outcome == FAILED:
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
             )
-        if self.fold is not None and self._jumped(state, guess, trial, step):
+        if judgement.outcome == JUMPS or (judgement.outcome == ASKS and self.sense(trial)):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
         low, before = self._aside(state, step) if state.singular else (0.0, here)
         self._stay_off_trivial(state, before, trial)
         if settings.mesh.every:
-            trial = core_step.settled(trial, state.tangent, settings.newton)
+            trial = settled(trial, state.tangent, settings.newton)
         return Arc(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
 
     def accepted(self, arc: Arc, judgement: Judgement, turned: bool) -> State:
         """Return the state behind a step, on the mesh that its end has settled on.
 
-        The next step is chosen so that the predictor's error is ``accuracy`` of it.
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
-        settings, state, trial, step = self.settings, arc.state, arc.trial, arc.step
-        angle, accuracy = aims(settings, state.system)
-        order, longest = 2 if state.previous_tangent is None else 3, settings.max_step
-        free = slice(state.system.state_size, None)
-        for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
-            longest = core_step.longest_step(longest, settings.change, value, rate)
-        following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)
+        state, trial, step = arc.state, arc.trial, arc.step
         way = self.sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         sensed = free_values(trial) if way else state.sensed
@@ -114,7 +107,7 @@ class Steps:
         if end.system is not state.system:
             previous = state.system.carrier(end.system)(previous)
         return State(
-            end.system, end.x, end.tangent, previous, step, following, end.sign, state.arclength + judgement.length,
+            end.system, end.x, end.tangent, previous, step, judgement.following, end.sign, state.arclength + judgement.length,
             state.accepted + 1, False, way or state.sense, sensed, end.discretization_error,
         )  # fmt: skip
 
@@ -147,17 +140,6 @@ class Steps:
             except ConvergenceError as error:
                 problem = error
         raise problem
-
-    def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
-        """Return whether the primary parameter misses its prediction by much of what it changes at all.
-
-        It may be a small part of the whole: the distance from the prediction does not show it then, and folds would be jumped.
-        """
-        at = trial.system.parameter_index(self.primary)
-        missed = abs(guess[at] - trial.x[at])
-        tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
-        change = step * max(abs(tangent[at]) for tangent in tangents)
-        return bool(core_step.is_astray(missed, change, trial.newton_error, trial.x[at]) and self.sense(trial))
 
     def _has_moved(self, start: Array, trial: Trial) -> bool:
         """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""

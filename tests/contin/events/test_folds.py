@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from contin import AlgebraicProblem, Newton, solve, trace
-from contin.core.step import corrected, predict, standing_at
+from contin.continuation.rules import predict
+from contin.core.step import corrected, standing_at
 from contin.core.trial import linearization
 from contin.events.arc import Arc
 from contin.events.folds import FoldSearch

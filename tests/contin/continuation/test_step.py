@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from contin import AlgebraicProblem, ConvergenceError, Newton
-from contin.core.step import State, corrected, judged, located, predict, standing_at
+from contin.continuation.rules import judged, predict
+from contin.core.step import State, corrected, located, standing_at
 from contin.core.trial import Linearization, Trial
 from contin.lowlevel import Algebraic
 
