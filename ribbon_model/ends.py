@@ -102,6 +102,26 @@ class End:
         return ("ball joint" if self.rotation == FREE else self.rotation) + place
 
 
+@dataclass(unsafe_hash=True)
+class Support(End):
+    """An end whose place and rotation are prescribed by numbers of other names than those of its joint.
+
+    Attributes
+    ----------
+    numbers : tuple of str
+        Names of the numbers for the place along the axes and for turn, bend and swing, as far as they are held; without any,
+        nothing moves this end.
+    origin : tuple of float, optional
+        The place from which they count, the drawn one by default.
+    strokes : tuple of (name, direction)
+        Further displacements.
+    """
+
+    numbers: tuple[str, ...] = ()
+    origin: Vector | None = None
+    strokes: tuple[tuple[str, Vector], ...] = ()
+
+
 #: Ends by name.
 CLAMP = End()
 FREE_END = End(FREE, held=())
@@ -218,20 +238,9 @@ def check_known(numbers: Mapping[str, float], known: tuple[str, ...]) -> None:
             raise ValueError(f"numbers: {name} is used by nothing here; there are {', '.join(known) or 'none'}")
 
 
-# --- conditions under integrals: phases, and a roller; each has a density and a multiplier ---------------------------
+# --- a roller: a condition under an integral, as a phase ------------------------------------------------------------------
 
 
-#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
-#: on one line), the place along a closed strip that is twisted to the right or to the left, and along a ring that buckles with
-#: two waves. Each is an integral condition that holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and
-#: x2 sin(2 pi s), those with the factors -3 and 0 lose their slope on the way to a Moebius band of a flat strip; with +3 they
-#: keep it.)
-PHASES = {
-    "spin": lambda t, x: x.x1,
-    "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
-    "shift, left": lambda t, x: x.x1 - 3 * x.x2 * math.sin(2 * math.pi * t),
-    "shift, two waves": lambda t, x: x.x1 * math.sin(4 * math.pi * t),
-}
 #: Fewest intervals of the mesh of a strip with a roller, and the most that are added so that one ends there. It is not adapted.
 _FEWEST, _MOST = 20, 100
 
@@ -271,32 +280,9 @@ class Roller:
         counts = range(max(least, _FEWEST), max(least, _FEWEST) + _MOST)
         return next((count for count in counts if abs(self.at * count - round(self.at * count)) < LOOSE), 0)
 
-    def density(self) -> Callable:
-        """Return g(t, x, p), whose integral over the strip vanishes where the roller holds it."""
-        at, (x, y, z) = self.at, self.direction
+    holds, name = True, "support"
 
-        def density(t, state, p):
-            before = (1 - (t - at) / (abs(t - at) + 1e-300)) / 2
-            d31, d32, d33 = directors(*state[:4])[6:]
-            return before * (x * d31 + y * d32 + z * d33) - p.roller
-
-        return density
-
-
-def densities(phases: tuple[str, ...], roller: Roller | None) -> Callable:
-    """Return the sum of all densities times their multipliers, as a function of (t, x, lam, p); the roller's is the last."""
-    return _together((*(_of_phase(name) for name in phases), *([roller.density()] if roller else [])))
-
-
-def _together(functions: tuple[Callable, ...]) -> Callable:
-    """Return the sum of these densities times their multipliers."""
-    if not functions:
-        return lambda t, x, lam, p: 0
-    rest, last, place = _together(functions[:-1]), functions[-1], len(functions) - 1
-    return lambda t, x, lam, p: rest(t, x, lam, p) + lam[place] * last(t, x, p)
-
-
-def _of_phase(name: str) -> Callable:
-    """Return the density of a phase as that of a roller is given."""
-    phase = PHASES[name]
-    return lambda t, x, p: phase(t, x)
+    def density(self, member: int, t, x, p, count: int):
+        """Return what is integrated over the strip, and vanishes where it is held; as `ribbon_model.phases.Phase.density`."""
+        before = (1 - (t - self.at) / (abs(t - self.at) + 1e-300)) / 2
+        return before * along(self.direction, directors(*x[:4])[6:]) - p.roller

@@ -35,15 +35,18 @@ def _spanned(axis, held) -> bool:
     return bool(np.linalg.norm(rest) < LOOSE)
 
 
-def distributed(weight: ends.Vector | None, foundation: ends.Vector | None) -> Callable:
-    """Return the potential of distributed loads per length, as a function of (x, p). None: there is no such load."""
+def distributed(weight: ends.Vector | None, foundation: ends.Vector | None, ground: float = 0.0) -> Callable:
+    """Return the potential of distributed loads per length, as a function of (x, p). None: there is no such load.
+
+    ``ground`` is where the plane of the foundation is along its direction.
+    """
 
     def potential(x, p):
         value = 0.0
         if weight is not None:
             value = value - p.weight * (weight[0] * x.x1 + weight[1] * x.x2 + weight[2] * x.x3)
         if foundation is not None:
-            offset = foundation[0] * x.x1 + foundation[1] * x.x2 + foundation[2] * x.x3
+            offset = foundation[0] * x.x1 + foundation[1] * x.x2 + foundation[2] * x.x3 - ground
             value = value + p.foundation * offset * offset / 2
         return value
 

@@ -18,6 +18,7 @@ zero, which is a check (`Network.reactions`).
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections import Counter, namedtuple
 from collections.abc import Callable, Mapping, Sequence
@@ -31,28 +32,30 @@ import contin
 from contin import ContinError, Point, ProblemError, solve, trace
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
-from ribbon_model.ends import ANGLES, FREE, HINGED, LOOSE, End, Vector, product
+from ribbon_model.ends import ANGLES, FREE, HINGED, JOINT, LOOSE, End, Roller, Support, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, numbers_of, straight
 from ribbon_model.outlines import fans
-from ribbon_model.phases import Phase, phase_along
+from ribbon_model.phases import PHASES, Phase, phase_along
 from ribbon_model.section import NATURAL, Section
 from ribbon_model.shape import Shape, shape_of
 
 __all__ = ["BALL", "FINISH", "HINGE", "RIGID", "START", "Joint", "JointEnd", "Load", "Member", "Network", "straight"]
 #: The number that leads from the drawing, which is free of stress at 0, to the network at 1: natural strains, loads, and gaps
-#: and turns of joints are this part of theirs.
+#: and turns of joints are this part of theirs. A drawing that needs none of this has no such number.
 ASSEMBLY = "assembly"
 #: Displacements of a joint along the axes of the drawing, behind its name.
 MOVES = ("dx", "dy", "dz")
 #: Numbers of loads that act all along.
-POTENTIALS = ("weight", "pressure", "field")
+POTENTIALS = ("weight", "foundation", "pressure", "field")
 #: The same of a load without an energy: a pressure that stays normal to strips.
 FOLLOWER = "follower_pressure"
 #: Why a state is not determined; before it, what moves.
 MECHANISM = (
     "can move, or turn about itself, without a change of energy, so nothing determines the state; hold more, or join rigidly"
 )
+#: A frame that is not turned.
+_UNTURNED = (1.0, 0.0, 0.0, 0.0)
 #: Why forces are not determined.
 UNDETERMINED = (
     "joints: what is joined and held repeats itself in this state, so the forces are not determined (straight strips between "
@@ -89,20 +92,26 @@ class Network:
         Ends that belong to no joint are free.
     held : mapping of str to End
         What is held at joints, on the axes of the drawing. The displacement of joint ``A`` is prescribed by the numbers
-        ``A_dx``, ``A_dy``, ``A_dz``, its rotation by ``A_turn``, ``A_bend``, ``A_swing``, as far as they are held.
+        ``A_dx``, ``A_dy``, ``A_dz``, its rotation by ``A_turn``, ``A_bend``, ``A_swing``, as far as they are held; a `Support`
+        gives them other names.
     loads : mapping of str to Load
         By the name of the number.
     numbers : mapping of str to float
         Values of loads and prescribed numbers, and of angles that joints name; zero where nothing is given. ``weight``: per
-        length; ``pressure``: per length of a strip that bends in a plane; ``field``: couple per length.
-    weight_direction, pressure_normal, field_direction : tuple of float
-        Where the weight pulls to; the normal of the plane in which members go around an area, counterclockwise, on which the
-        pressure acts from outside; the direction of a uniform field. ``follower_pressure``: per length, against the normal of
-        each strip, wherever it points to; without an energy.
+        length; ``foundation``: stiffness per length against displacements from a plane through the first joint that is held;
+        ``pressure``: per length of a strip that bends in a plane; ``field``: couple per length.
+    weight_direction, foundation_direction, pressure_normal, field_direction : tuple of float
+        Where the weight pulls to; the normal of the plane from which the foundation holds; that of the plane in which members
+        go around an area, counterclockwise, on which the pressure acts from outside; the direction of a uniform field.
+        ``follower_pressure``: per length, against the normal of each strip, wherever it points to; without an energy.
     magnetized : int
         The number (0, 1, 2) of the director along which strips are magnetized.
-    phases : sequence of Phase
-        Of a network that can shift along itself (`with_phases`, `with_waves`).
+    phases : sequence of Phase or str
+        Of a network that can shift along itself (`with_phases`, `with_waves`); of one strip, also names of `phases.PHASES`.
+    roller : Roller, optional
+        A support along the only strip, which begins at the origin; its number is ``roller``.
+    symmetries : mapping of str to callable
+        As in `contin.SegmentedVariationalProblem`.
 
     Raises
     ------
@@ -137,10 +146,17 @@ class Network:
     field_direction: Vector = (0.0, 1.0, 0.0)
     magnetized: int = 2
     phases: Sequence[Phase] = ()
+    foundation_direction: Vector = (0.0, 1.0, 0.0)
+    roller: Roller | None = None
+    symmetries: Mapping[str, Callable] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("weight_direction", "pressure_normal", "field_direction"):
+        for name in ("weight_direction", "foundation_direction", "pressure_normal", "field_direction"):
             setattr(self, name, ends.unit(name, getattr(self, name)))
+        for name in self.phases:
+            if isinstance(name, str) and (name not in PHASES or len(self.members) > 1):
+                raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}, for one strip")
+        self.phases = tuple(PHASES[one] if isinstance(one, str) else one for one in self.phases)
         self._check()
         ends.check_known(self.numbers, self.known)
         for name, times in Counter([*self.known, *self._of_sections, ASSEMBLY, *self._named((*FRAME, *CENTRELINE))]).items():
@@ -169,13 +185,18 @@ class Network:
             for joint_name, *_ in (*load.forces, *load.followers):
                 _known(f"loads: {number}: joint", joint_name, self.joints)
             for joint_name, _ in load.moments:
-                if joint_name not in self.held or self.held[joint_name].rotation != HINGED:
+                if joint_name not in self.held or self.held[joint_name].rotation not in (HINGED, JOINT):
                     raise ValueError(
                         f"loads: {number}: moments: {joint_name} must be held by a hinge; elsewhere a dead moment has no energy"
                     )
+        if self.numbers.get("foundation", 0.0) < 0:
+            raise ValueError(f"numbers: foundation = {self.numbers['foundation']:g} must not be negative")
+        if self.roller and len(self.members) > 1:
+            raise ValueError("roller: is for a single strip; hold a joint along it")
         if self.floats:
-            if "weight" in self.numbers:
-                raise ValueError("weight: nothing is held, so nothing bears it; hold a joint")
+            for name in ("weight", "foundation"):
+                if name in self.numbers:
+                    raise ValueError(f"{name}: nothing is held, so nothing bears it; hold a joint")
             for number, load in self.loads.items():
                 if load.followers:
                     raise ValueError(f"loads: {number}: nothing is held, so nothing bears forces that follow; hold a joint")
@@ -193,29 +214,64 @@ class Network:
     @property
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the sections."""
+        return (*self._always, *POTENTIALS, FOLLOWER)
+
+    @property
+    def _always(self) -> tuple[str, ...]:
+        """Names of the numbers that are there without being given."""
         angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
-        return (*self._prescribed, *self.loads, *dict.fromkeys(angles), *POTENTIALS, FOLLOWER)
+        strokes = [name for end in self.held.values() if isinstance(end, Support) for name, _ in end.strokes]
+        return (*self._prescribed, *(["roller"] if self.roller else []), *strokes, *self.loads, *dict.fromkeys(angles))
 
     @property
     def _prescribed(self) -> tuple[str, ...]:
         """Names of the numbers that prescribe held joints."""
-        found: list[str] = []
-        for name, end in self.held.items():
-            found += [f"{name}_{x}" for x, *parts in zip(MOVES, *end.held) if any(parts)]
-            found += [f"{name}_{angle}" for angle in ANGLES if end.rotation != FREE]
-        return tuple(found)
+        return tuple(name for joint in self.held for name in self.numbers_at(joint) if name)
+
+    def numbers_at(self, joint: str) -> tuple[str, ...]:
+        """Return the names of the numbers that prescribe the place of a held joint along the axes, then turn, bend and swing.
+
+        Those that are not held, or have no number, are ''.
+        """
+        end = self.held[joint]
+        names = end.numbers if isinstance(end, Support) else [f"{joint}_{name}" for name in (*MOVES, *ANGLES)]
+        held = [*(any(parts) for parts in zip((0,) * 3, *end.held)), *[end.rotation != FREE] * 3]
+        return tuple(name if has else "" for name, has in zip(names or ("",) * 6, held))
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        potentials = [name for name in (*POTENTIALS, FOLLOWER) if name in self.numbers]
-        always = [name for name in self.known if name not in (*POTENTIALS, FOLLOWER)]
-        values = {name: float(self.numbers.get(name, 0.0)) for name in (*always, *potentials)}
+        names = (*self._always, *(name for name in (*POTENTIALS, FOLLOWER) if name in self.numbers))
+        values = {name: float(self.numbers.get(name, self._usual.get(name, 0.0))) for name in names}
         own = {
             self.full_name(name, number): value
             for name, section in self.sections.items() for number, value in section.parameters.items()
         }  # fmt: skip
-        return values | own | {ASSEMBLY: 1.0}
+        return values | own | dict.fromkeys(self._unstressed, 1.0)
+
+    @property
+    def _usual(self) -> Mapping[str, float]:
+        """Values of numbers that are not given, where they are not zero."""
+        return {}
+
+    @property
+    def _unstressed(self) -> dict[str, float]:
+        """The numbers of the drawing without stress."""
+        return {ASSEMBLY: 0.0} if self.assembles else {}
+
+    @functools.cached_property
+    def assembles(self) -> bool:
+        """Whether the drawing is under stress, has gaps, turned ends or loads, so that `ASSEMBLY` leads from it to a state."""
+        angles = [each.angle for joint in self.joints.values() for each in joint.members]
+        acting = any(self.numbers.get(name) for name in (*self.loads, *POTENTIALS, FOLLOWER, *angles))
+        drawn = [(self.sections[one.section], *each) for one in self.members.values() for each in zip(NATURAL, one.strains)]
+        bent = any(name in one.along or abs(one.parameters.get(name, x) - x) > LOOSE for one, name, x in drawn)
+        return acting or bent or bool(self._gaps) or any(angle and not isinstance(angle, str) for angle in angles)
+
+    @property
+    def _part(self) -> Callable:
+        """Return the part of natural strains, loads and turns that acts, as a function of the numbers."""
+        return _assembled if self.assembles else _whole
 
     def full_name(self, section: str, number: str) -> str:
         """Return the name of a number of a section among all."""
@@ -238,8 +294,12 @@ class Network:
 
     def drawn(self, each: JointEnd) -> np.ndarray:
         """Return quaternion and place (7,) of an end as it is drawn."""
-        member = self.members[each.member]
-        return member.drawn([0.0 if each.end == START else member.length])[0]
+        return self._drawn_ends[each.member, each.end]
+
+    @functools.cached_property
+    def _drawn_ends(self) -> dict[tuple[str, str], np.ndarray]:
+        both = ((name, one, end) for name, one in self.members.items() for end in (START, FINISH))
+        return {(name, end): one.drawn([0.0 if end == START else one.length])[0] for name, one, end in both}
 
     def drawn_axes(self, each: JointEnd) -> np.ndarray:
         """Return the directors of an end as it is drawn, as rows (3, 3)."""
@@ -273,20 +333,41 @@ class Network:
             Conditions that repeat or contradict each other.
         """
         densities: dict[tuple, Callable] = {}
-        segments, phases = [], [f"phase_{number}" for number in range(len(self.phases))]
+        segments, work, part = [], None, self._part
+
+        def following(s, x, y, p):
+            """Return the work of a pressure against the normal d2 of a strip at x, on another state."""
+            return -part(p) * p.follower_pressure * sum(d * r for d, r in zip(directors(*x[:4])[3:6], y[4:7]))
+
+        if FOLLOWER in self.numbers:
+            work = following
         for place, (name, member) in enumerate(self.members.items()):
             homogeneous = self.sections[member.section].homogeneous
-            differs = place if phases else None
+            differs = place if self.phases else None
             key = member.section, member.strains, None if homogeneous else member.length, differs, self._outline[0].get(name)
             if key not in densities:
                 densities[key] = self._hamiltonian(member, place)
-            states = (*FRAME, *CENTRELINE, *phases)
-            work = _following_pressure if FOLLOWER in self.numbers else None
-            segments.append(contin.VariationalSegment(None, states, member.length, hamiltonian=densities[key], work=work))
+            segments.append(
+                contin.VariationalSegment(
+                    None, (*FRAME, *CENTRELINE, *self.integrals), member.length, hamiltonian=densities[key], work=work,
+                    functionals=self._functionals(),
+                )
+            )  # fmt: skip
+        phases = list(self.integrals)[: len(self.phases)]
         return contin.SegmentedVariationalProblem(
             segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
-            phases=self._named(phases), end_work=self._end_work(),
+            phases=self._named(phases), end_work=self._end_work(), symmetries=self.symmetries,
         )  # fmt: skip
+
+    def _functionals(self) -> Mapping[str, Callable]:
+        """Return integrals over each member that are columns of points."""
+        return {}
+
+    @property
+    def integrals(self) -> dict[str, Phase | Roller]:
+        """Conditions under integrals by the names of the states that accumulate them."""
+        found = {f"phase_{phase.name or number}": phase for number, phase in enumerate(self.phases)}
+        return found | ({"support": self.roller} if self.roller else {})
 
     def _named(self, states: Sequence[str]) -> list[str]:
         """Return the names of states of all members among all states."""
@@ -297,7 +378,7 @@ class Network:
     def places(self) -> list[list[int]]:
         """Places of quaternion, centreline, and their multipliers (14) of each member among all states."""
         own = range(len(FRAME) + len(CENTRELINE))
-        shift = len(own) + len(self.phases)
+        shift = len(own) + len(self.integrals)
         return [[*(piece.at[i] for i in own), *(piece.at[shift + i] for i in own)] for piece in self.problem.pieces]
 
     def _hamiltonian(self, member: Member, place: int) -> Callable:
@@ -305,20 +386,22 @@ class Network:
         complementary, own = section.hamiltonian(), tuple(section.parameters)
         numbers, full = namedtuple("Numbers", own), [self.full_name(name, number) for number in own]
         homogeneous, potential = section.homogeneous, self._distributed(list(self.members)[place])
-        phases, count = self.phases, len(self.members)
+        integrals, count, part_of = list(self.integrals.values()), len(self.members), self._part
         drawn = {own.index(each): x for each, x in zip(NATURAL, member.strains) if each in own and each not in section.along}
+        drawn = drawn if self.assembles else {}
 
         def hamiltonian(s, x, lam, p):
             q, n1, n2, n3 = x[:4], *lam[4:7]
             M1, M2, M3 = moment_of(q, lam[:4])
             d = directors(*q)
             values = [getattr(p, each) for each in full]
+            part = part_of(p)
             for number, strain in drawn.items():
-                values[number] = p.assembly * values[number] + (1 - p.assembly) * strain
+                values[number] = part * values[number] + (1 - part) * strain
             value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*values))
-            value = value + n1 * d[6] + n2 * d[7] + n3 * d[8] - p.assembly * potential(x, d, p)
-            for phase, multiplier in zip(phases, lam[7:]):
-                value = value + multiplier * phase.density(place, s / length, x, count) / length
+            value = value + n1 * d[6] + n2 * d[7] + n3 * d[8] - part * potential(x, d, p)
+            for integral, multiplier in zip(integrals, lam[7:]):
+                value = value + multiplier * integral.density(place, s / length, x, p, count) / length
             return value
 
         return hamiltonian
@@ -326,7 +409,10 @@ class Network:
     def _distributed(self, member: str) -> Callable:
         """Return the potential per length of weight, pressure and field, as a function of (x, directors, p)."""
         fan, couple = self._outline[0].get(member), "field" in self.numbers
-        weight = loads.distributed(self.weight_direction if "weight" in self.numbers else None, None)
+        weight = loads.distributed(
+            self.weight_direction if "weight" in self.numbers else None,
+            self.foundation_direction if "foundation" in self.numbers else None, self.ground,
+        )  # fmt: skip
         normal, along, first = self.pressure_normal, self.field_direction, 3 * self.magnetized
 
         def potential(x, d, p):
@@ -340,16 +426,21 @@ class Network:
 
         return potential
 
+    @property
+    def ground(self) -> float:
+        """Where the plane of the foundation is along its direction."""
+        return float(np.dot(self.foundation_direction, self.drawn_place(next(iter(self.held))))) if self.held else 0.0
+
     def _conditions(self) -> Callable:
         """Return what vanishes at the ends."""
         joints = list(self.joints.items())
         held = [(name, *self._prescribing(name, end)) for name, end in self.held.items()]
         floating = self._floating() if self.floats else None
-        holding = [phase.holds for phase in self.phases]
+        holding, begins = [each.holds for each in self.integrals.values()], self._begins
         gaps, readers = self._gaps, {name: self._reader(joint) for name, joint in self.joints.items()}
 
         def conditions(a, b, p):
-            found = [x.q0 * x.q0 + x.q1 * x.q1 + x.q2 * x.q2 + x.q3 * x.q3 - 1 for x in a]
+            found = [_unit(x) for number, x in enumerate(a) if number not in begins.values()]
             for name, joint in joints:
                 (first, origin), *others = readers[name](a, b, p)
                 before = first
@@ -362,40 +453,66 @@ class Network:
                     before = frame
             for name, frame_of, place_of, rotation, position in held:
                 frame, place = readers[name](a, b, p)[0]
-                found += [*rotation(frame, frame_of(p)), *position(place, place_of(p))]
+                if name in begins:  # a frame that does not move is fixed by four numbers
+                    fixed = rotation(frame, _UNTURNED)
+                    found += [frame[0] - 1, *frame[1:]] if len(fixed) == 3 else [*fixed, _unit(a[begins[name]])]
+                else:
+                    found += rotation(frame, frame_of(p))
+                found += position(place, place_of(p))
             for number, holds in enumerate(holding, 7):
                 found += [x[number] for x in a] + ([sum(x[number] for x in b)] if holds else [])
             return found + (floating(a) if floating else [])
 
         return conditions
 
+    @property
+    def _begins(self) -> dict[str, int]:
+        """Supports without numbers at the beginning of a member that is drawn on the axes, and the number of that member."""
+        order, found = list(self.members), {}
+        for name, end in self.held.items():
+            first = self.joints[name].members[0]
+            plain = first.end == START and first.angle == 0 and numbers_of(self.drawn(first)[:4]) == _UNTURNED
+            if plain and isinstance(end, Support) and not end.numbers:
+                found[name] = order.index(first.member)
+        return found
+
     def _reader(self, joint: Joint) -> Callable:
         """Return ``read(a, b, p)``: joint frame and place of each end of a joint."""
         order = list(self.members)
         known = [(order.index(each.member), each, numbers_of(self.drawn(each)[:4])) for each in joint.members]
+        part = self._part
 
         def read(a, b, p):
             found = []
             for number, each, drawn in known:
                 x = (a if each.end == START else b)[number]
-                found.append((_joint_frame(x[:4], drawn, each, p), _moved(x, each.arm)))
+                found.append((_joint_frame(x[:4], drawn, each, p, part(p)), _moved(x, each.arm)))
             return found
 
         return read
 
     def _prescribing(self, name: str, end: End) -> tuple[Callable, Callable, Callable, Callable]:
         """Return prescribed frame and place of a joint as functions of p, and the conditions for both."""
-        drawn = self.drawn_place(name)
-        along, angles = (tuple(f"{name}_{each}" for each in names) for names in (MOVES, ANGLES))
-        numbers, turned = self._prescribed, end.rotation != FREE
+        names, origin, strokes = self.numbers_at(name), None, ()
+        if isinstance(end, Support):
+            origin, strokes = end.origin, end.strokes
+        drawn = self.drawn_place(name) if origin is None else origin
 
         def frame_of(p):
-            return ends.prescribed(*(getattr(p, angle) for angle in angles)) if turned else (1, 0, 0, 0)
+            return ends.prescribed(*(getattr(p, angle) for angle in names[3:])) if names[5] else _UNTURNED
 
         def place_of(p):
-            return [float(x) + (getattr(p, each) if each in numbers else 0) for x, each in zip(drawn, along)]
+            place = [float(x) + (getattr(p, each) if each else 0) for x, each in zip(drawn, names)]
+            for number, direction in strokes:
+                place = [x + getattr(p, number) * part for x, part in zip(place, direction)]
+            return place
 
         return frame_of, place_of, ends.rotation_conditions(end), ends.place_conditions(end)
+
+    @functools.cached_property
+    def prescriptions(self) -> dict[str, tuple[Callable, Callable]]:
+        """Prescribed frame and place of each joint that is held, as functions of the numbers."""
+        return {name: self._prescribing(name, end)[:2] for name, end in self.held.items()}
 
     def _floating(self) -> Callable:
         """Return the conditions that hold the rigid motions of a network that floats, at the first end of the first member."""
@@ -430,7 +547,7 @@ class Network:
         if not self.loads and not self._outline[1]:
             return None
         slides = [
-            (fan, self._reader(Joint([each])), self._prescribing(name, self.held[name])[1])
+            (fan, self._reader(Joint([each])), self.prescriptions[name][1])
             for each, name, fan in self._outline[1]
         ]  # fmt: skip
         forces = []
@@ -442,20 +559,21 @@ class Network:
                     (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
                 )
         turns = [
-            (number, factor, self._reader(self.joints[name]), ends.angle_of(end), self._prescribing(name, end)[0])
+            (number, factor, self._reader(self.joints[name]), ends.angle_of(end), self.prescriptions[name][0])
             for number, load in self.loads.items() for name, factor in load.moments for end in (self.held[name],)
         ]  # fmt: skip
+        part_of = self._part
 
         def potential(a, b, p):
-            value = 0.0
+            value, part = 0.0, part_of(p)
             for number, read, direction in forces:
                 place = read(a, b, p)[0][1]
-                value = value - p.assembly * getattr(p, number) * ends.along(direction, place)
+                value = value - part * getattr(p, number) * ends.along(direction, place)
             for number, factor, read, angle, frame_of in turns:
-                value = value - p.assembly * getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
+                value = value - part * getattr(p, number) * factor * angle(read(a, b, p)[0][0], frame_of(p))
             for (sign, centre), read, place_of in slides:
                 to, place = ([x - c for x, c in zip(r, centre)] for r in (place_of(p), read(a, b, p)[0][1]))
-                value = value - sign * p.assembly * p.pressure * ends.along(self.pressure_normal, ends.cross(to, place)) / 2
+                value = value - sign * part * p.pressure * ends.along(self.pressure_normal, ends.cross(to, place)) / 2
             return value
 
         return potential
@@ -471,13 +589,14 @@ class Network:
             own = tuple(numbers_of(self.drawn_axes(first) @ v) for v in (direction, arm))
             place, end = list(self.members).index(first.member), 0 if first.end == START else 1
             found.append((number, place, end, own[0], tuple(x + y for x, y in zip(first.arm, own[1]))))
+        part_of = self._part
 
         def work(a, b, y_a, y_b, p):
-            value = 0.0
+            value, part = 0.0, part_of(p)
             for number, place, end, along, arm in found:
                 here, moved = ((states[end][place]) for states in ((a, b), (y_a, y_b)))
                 force = [x - y for x, y in zip(_moved(here, along), here[4:7])]
-                value = value + p.assembly * getattr(p, number) * sum(x * y for x, y in zip(force, _moved(moved, arm)))
+                value = value + part * getattr(p, number) * sum(x * y for x, y in zip(force, _moved(moved, arm)))
             return value
 
         return work
@@ -486,7 +605,7 @@ class Network:
 
     def guess(self) -> list[Callable]:
         """Return the drawing as a guess, one function of s for each member."""
-        return [functools.partial(_drawn_at, member, len(self.phases)) for member in self.members.values()]
+        return [functools.partial(_drawn_at, member, len(self.integrals)) for member in self.members.values()]
 
     def first_point(
         self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options
@@ -510,14 +629,14 @@ class Network:
         first: ContinError | None = None
         try:
             point = self.state_near(guess, values, **options)
-            if self._moved_by(point, guess) < _NEAR:
+            if not self.assembles or self._moved_by(point, guess) < _NEAR:
                 return point, "from the drawing"
         except ContinError as error:
             first = error
         if is_drawn and (told := self._undetermined()):
             raise ProblemError(told) from first
         try:
-            drawn = self.state_near(guess, {**(values or {}), ASSEMBLY: 0.0}, **options)
+            drawn = self.state_near(guess, {**(values or {}), **self._unstressed}, **options)
         except ContinError as error:
             raise ProblemError(UNDETERMINED if Undetermined.CONDITIONS in str(error) else str(error)) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
@@ -539,7 +658,7 @@ class Network:
     def _check_reach(self) -> None:
         """Raise ProblemError for joints that are held farther apart than the strips between them are long."""
         numbers = SimpleNamespace(**self.parameters)
-        places = {name: np.array(self._prescribing(name, end)[1](numbers)) for name, end in self.held.items()}
+        places = {name: np.array(place_of(numbers)) for name, (_, place_of) in self.prescriptions.items()}
         ends_of = [(name, each) for name, joint in self.joints.items() for each in joint.members]
         arms = {(each.member, each.end): (name, float(np.linalg.norm(each.arm))) for name, each in ends_of}
         both = [(arms.get((name, START)), arms.get((name, FINISH)), one.length) for name, one in self.members.items()]
@@ -572,7 +691,7 @@ class Network:
             loads = {name: replace(load, followers=()) for name, load in self.loads.items()}
             other = replace(self, loads=loads, numbers={name: x for name, x in self.numbers.items() if name != FOLLOWER})
             problem = other.problem
-        values = {**problem.parameters, **other.parameters, ASSEMBLY: 0.0}
+        values = {**problem.parameters, **other.parameters, **other._unstressed}
         system = problem.discretized(problem.multipliers, values, None, np.linspace(0, 1, 11), 4)
         states = np.zeros((len(system.nodes), len(problem.state_names)))
         for member, places in zip(self.members.values(), other.places):
@@ -599,6 +718,21 @@ class Network:
         moved = np.abs(modes / ([1.0] * 4 + [self.longest] * 3)).max(axis=(0, 1, 3))
         names = dict.fromkeys(name.partition(" ")[0] for name, x in zip(self.members, moved) if x > _MOVES * moved.max())
         return f"joints: {', '.join(names)} {MECHANISM}"
+
+    def moves_rigidly(self, known: np.ndarray, values: Mapping[str, float]) -> bool:
+        """Return whether a rigid motion violates no condition at the ends of states (K, ...), in the problem's order."""
+        problem = self.problem
+        n, batch = problem.dimension, problem.batch("boundary")
+        states = np.zeros((2, len(batch.signature.states)))
+        states[:, : known.shape[1]] = known[[0, -1]]
+        p = np.array([float(values.get(name, value)) for name, value in problem.parameters.items()])
+        jacobian = batch.jacobian(np.zeros(1), states[:1], states[1:], p, batch.columns([]))[1][0]
+        count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
+        by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
+        motions = np.zeros((6, 2, n))
+        for end, at in itertools.product((0, 1), (places[:7] for places in self.places)):
+            motions[:, end, at] = [_carried(states[end, at], k) for k in range(6)]
+        return int(np.linalg.matrix_rank(by_ends @ motions.reshape(6, -1).T, tol=LOOSE)) < 6
 
     @property
     def turning(self) -> list[str]:
@@ -745,14 +879,15 @@ class Network:
         force = moment / length
         own = set(self._of_sections)
         found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": max(force, moment)}
-        found |= dict.fromkeys([name for name in self._prescribed if name.endswith(MOVES)], length)
+        found |= dict.fromkeys([name for joint in self.held for name in self.numbers_at(joint)[:3] if name], length)
         found |= dict.fromkeys(self.loads, force) | dict.fromkeys(
             [name for name in (*POTENTIALS, FOLLOWER) if name in found], force / length
         )
+        if "foundation" in found:
+            found["foundation"] = force / length**2
         for number in range(len(self.members)):
             behind = f"_{number}" if len(self.members) > 1 else ""
-            phases = [f"phase_{number}" for number in range(len(self.phases))]
-            for names, size, push in ((FRAME, 1.0, moment), (CENTRELINE, length, force), (phases, 1.0, force)):
+            for names, size, push in ((FRAME, 1.0, moment), (CENTRELINE, length, force), (self.integrals, 1.0, force)):
                 found |= {f"{name}{behind}": size for name in names} | {f"lam_{name}{behind}": push for name in names}
         return found
 
@@ -774,7 +909,7 @@ class Network:
         return found
 
     def _strains_of(self, name: str, system: Collocation, x: np.ndarray) -> np.ndarray:
-        return self.strains(system, x)[name]
+        return self.strains_at(system.nodes, system.states(x), system.all_parameters(x))[name]
 
     def domain_tests(self) -> list[contin.Event]:
         """Return the test functions that end a run where a law ends; none for laws that are regular everywhere."""
@@ -822,7 +957,7 @@ class Network:
 
     def _reaction(self, point: Point, those: Sequence[JointEnd], name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force and moment on ends that meet, about their place, less the loads at the joint of this name."""
-        force, moment, first = np.zeros(3), np.zeros(3), those[0]
+        force, moment, first, numbers = np.zeros(3), np.zeros(3), those[0], SimpleNamespace(**point.parameters)
         origin = _at_arm(self._state(point, first)[:7], first.arm)
         for each in those:
             pull, couple, place = self._at_end(point, each)
@@ -831,12 +966,12 @@ class Network:
             turned = [(where, self._arm(point, first, along), arm) for where, along, arm in load.followers]
             for where, direction, arm in (*load.forces, *turned):
                 if where == name:
-                    pull = point[ASSEMBLY] * point[number] * np.array(direction)
+                    pull = self._part(numbers) * point[number] * np.array(direction)
                     force, moment = force - pull, moment - np.cross(self._arm(point, first, arm), pull)
             for where, factor in load.moments:
                 if where == name:
-                    frame = self._prescribing(name, self.held[name])[0](SimpleNamespace(**point.parameters))
-                    moment -= point[ASSEMBLY] * point[number] * factor * (np.array(self.held[name].axis) @ _axes(frame))
+                    frame = self.prescriptions[name][0](numbers)
+                    moment -= self._part(numbers) * point[number] * factor * (np.array(self.held[name].axis) @ _axes(frame))
         return force, moment
 
     def _at_end(self, point: Point, each: JointEnd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -848,7 +983,8 @@ class Network:
         row = self._state(point, each)
         sign = -1.0 if each.end == START else 1.0
         side, centre = self._outline[0].get(each.member, (0, row[4:7]))
-        fan = side * point[ASSEMBLY] * point.parameters.get("pressure", 0.0) * np.cross(row[4:7] - centre, self.pressure_normal)
+        pressure = point.parameters.get("pressure", 0.0) * self._part(SimpleNamespace(**point.parameters))
+        fan = side * pressure * np.cross(row[4:7] - centre, self.pressure_normal)
         return sign * (row[11:14] + fan / 2), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
 
     def place(self, point: Point, joint: str) -> np.ndarray:
@@ -860,7 +996,8 @@ class Network:
         """Return the quaternion of the joint frame, the identity in the drawing."""
         first = self.joints[joint].members[0]
         q, drawn = (numbers_of(state[:4]) for state in (self._state(point, first), self.drawn(first)))
-        return _joint_frame(q, drawn, first, SimpleNamespace(**point.parameters))
+        numbers = SimpleNamespace(**point.parameters)
+        return _joint_frame(q, drawn, first, numbers, self._part(numbers))
 
     def _state(self, point: Point, each: JointEnd) -> np.ndarray:
         """Return quaternion, place, and their multipliers (14,) at an end."""
@@ -880,9 +1017,17 @@ class Network:
         return point["energy"] + float(self._end_energy(first, last, SimpleNamespace(**point.parameters)))
 
 
-def _following_pressure(s, x, y, p):
-    """Return the work of a pressure against the normal d2 of a strip at x, on another state."""
-    return -p.assembly * p.follower_pressure * sum(d * r for d, r in zip(directors(*x[:4])[3:6], y[4:7]))
+def _unit(x):
+    """Return what vanishes for a unit quaternion."""
+    return x.q0 * x.q0 + x.q1 * x.q1 + x.q2 * x.q2 + x.q3 * x.q3 - 1
+
+
+def _assembled(p):
+    return p.assembly
+
+
+def _whole(p):
+    return 1
 
 
 def _known(what: str, name: str, names: Mapping) -> None:
@@ -903,16 +1048,26 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
 
 def _from_drawing(q, drawn: tuple) -> tuple:
     """Return q conj(q0) of an end that is drawn with the quaternion q0."""
+    if drawn == _UNTURNED:
+        return tuple(q)
     return product(q, (drawn[0], *(-x for x in drawn[1:])))
 
 
-def _joint_frame(q, drawn: tuple, each: JointEnd, p) -> tuple:
-    """Return J, the same less the angle by which the end is turned before it is joined."""
+def _joint_frame(q, drawn: tuple, each: JointEnd, p, part) -> tuple:
+    """Return J, the same less that part of the angle by which the end is turned before it is joined."""
     frame = _from_drawing(q, drawn)
     if each.angle == 0:
         return frame
-    half = p.assembly * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
+    half = part * (getattr(p, each.angle) if isinstance(each.angle, str) else each.angle) / 2
     return product(frame, (math.cos(half), *(-math.sin(half) * part for part in each.axis)))
+
+
+def _carried(state: np.ndarray, k: int) -> np.ndarray:
+    """Return the change of quaternion and place (7,) by a rigid translation (k < 3) or rotation about the origin."""
+    axis = np.eye(3)[k % 3]
+    if k < 3:
+        return np.append(np.zeros(4), axis)
+    return np.append(product((0, *axis / 2), state[:4]), np.cross(axis, state[4:7]))
 
 
 def _axes(state: np.ndarray) -> np.ndarray:

@@ -22,9 +22,9 @@ from scipy.spatial.transform import Rotation
 
 from contin.lowlevel import Collocation, shown
 from ribbon_model import ends
-from ribbon_model.ends import ANGLES, CLAMPED, FREE, HINGED, JOINT
+from ribbon_model.ends import CLAMPED, FREE, HINGED, JOINT
 from ribbon_model.members import BALL, HINGE, RIGID, START, JointEnd
-from ribbon_model.network import MOVES, POTENTIALS, Network
+from ribbon_model.network import Network
 from ribbon_model.second_variation import cross_matrix
 from ribbon_model.segments import Chain, moved
 from ribbon_model.shape import frames
@@ -87,6 +87,20 @@ class Piece(Chain):
         last = rigid + self.of_strains(own.transpose(1, 0, 2))
         last[:, :3] = -cross_matrix(x[-1])
         return rigid, last
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """Length (N + 1,) that belongs to the beginning and to the end of each segment."""
+        return np.diff(np.clip(np.arange(-0.5, len(self.strains) + 1), 0, len(self.strains))) * self.segment
+
+    def moves_along(self, axis: np.ndarray) -> np.ndarray:
+        """Return the derivatives (N + 1, size) of the places of these along an axis."""
+        x, count = self.centreline, len(self.strains)
+        turned = np.einsum("jib,nji->njb", self.turning, np.cross(x[:, None] - x[1:], axis))
+        rows = (axis @ self.own + turned) * (np.arange(count) < np.arange(count + 1)[:, None])[:, :, None]
+        found = self.of_strains(rows)
+        found[:, :3], found[:, 3:6] = np.cross(x, axis), axis
+        return found
 
     def work(self, forces: np.ndarray) -> np.ndarray:
         """Return the derivative (size,) of the sum of forces (N, 3) . x at the ends of the segments."""
@@ -190,9 +204,10 @@ class NetworkChain:
     def energy(self) -> float:
         """The potential: of the strains, and of all loads."""
         value = sum(piece.segment * float(U.sum()) for piece, (U, *_) in zip(self.pieces, self._densities))
-        for piece, forces in zip(self.pieces, self._weights):
-            value -= float(np.sum(forces * (piece.place + piece.centreline[1:])))
-            value -= float(piece.place @ self._first_weight(piece))
+        weight, stiffness, down, _ = self._distributed
+        for piece, offset in zip(self.pieces, self._offsets):
+            value -= weight * float(piece.shares @ (piece.place + piece.centreline) @ down)
+            value += stiffness / 2 * float(piece.shares @ offset**2)
         for end, force in self._forces:
             value -= float(force @ self._place(end))
         for name, _, size in self._moments:
@@ -200,19 +215,25 @@ class NetworkChain:
         return value
 
     @property
-    def _weights(self) -> list[np.ndarray]:
-        """The weight that acts at the ends of the segments of each member (N, 3)."""
-        pull = self.numbers.get("weight", 0.0) * np.array(self.network.weight_direction)
-        found = []
-        for piece in self.pieces:
-            shares = np.full(len(piece.strains), piece.segment)
-            shares[-1] /= 2
-            found.append(shares[:, None] * pull)
-        return found
+    def _distributed(self) -> tuple[float, float, np.ndarray, np.ndarray]:
+        """Weight and stiffness of the foundation per length, and their directions."""
+        down, across = self.network.weight_direction, self.network.foundation_direction
+        return self.numbers.get("weight", 0.0), self.numbers.get("foundation", 0.0), np.array(down), np.array(across)
 
-    def _first_weight(self, piece: Piece) -> np.ndarray:
-        """Return the weight that acts at the beginning of a member: that of half a segment."""
-        return self.numbers.get("weight", 0.0) * piece.segment / 2 * np.array(self.network.weight_direction)
+    @cached_property
+    def _offsets(self) -> list[np.ndarray]:
+        """Displacements (N + 1,) of each member against the foundation, at the beginning and at the end of each segment."""
+        across, ground = self._distributed[3], self.network.ground
+        return [(piece.place + piece.centreline) @ across - ground for piece in self.pieces]
+
+    @cached_property
+    def _pulls(self) -> list[np.ndarray]:
+        """The forces (N + 1, 3) of weight and foundation there."""
+        weight, stiffness, down, across = self._distributed
+        return [
+            piece.shares[:, None] * (weight * down - stiffness * offset[:, None] * across)
+            for piece, offset in zip(self.pieces, self._offsets)
+        ]
 
     @cached_property
     def _forces(self) -> list[tuple[_End, np.ndarray]]:
@@ -259,12 +280,15 @@ class NetworkChain:
     def _hinge(self, name: str) -> tuple[np.ndarray, float, np.ndarray]:
         """Return the frame of a support, turned with its hinge, that angle, and the axis of the hinge."""
         end = self.network.held[name]
-        frame = np.array(ends.directors(*ends.prescribed(*(self.numbers.get(f"{name}_{x}", 0.0) for x in ANGLES))))
-        frame = frame.reshape(3, 3).T
+        frame = np.reshape(ends.directors(*self.network.prescriptions[name][0](self._values)), (3, 3)).T
         if end.rotation != HINGED:
             return frame, 0.0, np.zeros(3)
         turned, angle = _turned(frame, self._joint_frame(self.network.joints[name].members[0]), np.array(end.axis))
         return turned, angle, frame @ np.array(end.axis)
+
+    @cached_property
+    def _values(self) -> SimpleNamespace:
+        return SimpleNamespace(**self.numbers)
 
     # --- conditions -------------------------------------------------------------------------------------------------------
 
@@ -291,8 +315,7 @@ class NetworkChain:
     def _of_supports(self) -> Iterator[_Condition]:
         for name, end in self.network.held.items():
             each = self.network.joints[name].members[0]
-            here, to = self._end(each), self.network.drawn_place(name)
-            to = to + [self.numbers.get(f"{name}_{move}", 0.0) for move in MOVES]
+            here, to = self._end(each), self.network.prescriptions[name][1](self._values)
             if end.held:
                 held = np.array(end.held)
                 yield _Condition(False, held, held @ (self._place(here) - to), here)
@@ -335,9 +358,9 @@ class NetworkChain:
         """
         count, slopes = sum(len(piece.strains) for piece in self.pieces), self._slopes
         gradient = np.zeros(self.size)
-        for number, (piece, (_, moment, _), pulls) in enumerate(zip(self.pieces, self._densities, self._weights)):
-            own = piece.of_strains(piece.segment * moment) - piece.work(pulls)
-            own[3:6] -= self._first_weight(piece)
+        for number, (piece, (_, moment, _), pulls) in enumerate(zip(self.pieces, self._densities, self._pulls)):
+            own = piece.of_strains(piece.segment * moment) - piece.work(pulls[1:])
+            own[3:6] -= pulls[0]
             gradient[self._own(number)] = own
         acting = _Acting(self)
         for end, force in self._forces:
@@ -362,13 +385,17 @@ class NetworkChain:
     def _hessian(self, acting: _Acting) -> np.ndarray:
         """Return the second derivatives (n, n) of the energy and of the conditions times their multipliers."""
         found = np.zeros((self.size, self.size))
-        for number, (piece, (_, _, stiffness), pulls) in enumerate(zip(self.pieces, self._densities, self._weights)):
-            forces = -pulls
+        _, springs, _, across = self._distributed
+        for number, (piece, (_, _, stiffness), pulls) in enumerate(zip(self.pieces, self._densities, self._pulls)):
+            forces = -pulls[1:]
             forces[-1] += acting.forces[number, 1]
             block = piece.second(acting.moments[number, 1], forces)
             free, inner = list(piece.free), np.arange(len(piece.strains))
             strains = block[6:, 6:].reshape(len(inner), len(free), len(inner), len(free))
             strains[inner, :, inner] += piece.segment * stiffness[:, free][:, :, free]
+            if springs:
+                moves = piece.moves_along(across)
+                block += springs * (piece.shares[:, None] * moves).T @ moves
             for last, turns in enumerate(piece.turns):
                 block += turns.T @ acting.arms[number, last] @ turns
             found[self._own(number), self._own(number)] = block
@@ -442,7 +469,7 @@ def unsupported(network: Network) -> str:
     """Return why there are no chains of segments of a network, '' if there are."""
     if network.phases:
         return "a network with phases"
-    for name in POTENTIALS[1:]:
+    for name in ("pressure", "field"):
         if name in network.numbers:
             return f"a network with {name}"
     if any(end.rotation == JOINT for end in network.held.values()):

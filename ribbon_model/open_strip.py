@@ -23,9 +23,10 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
 from contin.lowlevel import Collocation, Continuation, Undetermined, shown
 from ribbon_model import ends, law_end, loads
-from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PHASES, PLACE, End, Roller
+from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End, Roller
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
 from ribbon_model.loads import FORCES, LOADS, STROKE
+from ribbon_model.phases import PHASES
 from ribbon_model.section import Section, natural_end, natural_states
 from ribbon_model.shape import Shape, shape_of
 
@@ -170,7 +171,8 @@ class OpenStrip:
         return len(self.phases) + (self.roller is not None)
 
     def _hamiltonian(self) -> Callable:
-        complementary, inside = self.section.hamiltonian(), ends.densities(self.phases, self.roller)
+        complementary = self.section.hamiltonian()
+        integrals = [*(PHASES[name] for name in self.phases), *([self.roller] if self.roller else [])]
         potential = loads.distributed(
             self.weight_direction if "weight" in self.numbers else None,
             self.foundation_direction if "foundation" in self.numbers else None,
@@ -180,7 +182,10 @@ class OpenStrip:
             q, n1, n2, n3 = x[:4], *lam[4:7]
             M1, M2, M3 = moment_of(q, lam[:4])
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            return complementary(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + inside(t, x, lam[7:], p)
+            value = complementary(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p)
+            for integral, multiplier in zip(integrals, lam[7:]):
+                value = value + multiplier * integral.density(0, t, x, p, 1)
+            return value
 
         return hamiltonian
 

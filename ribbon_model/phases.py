@@ -37,18 +37,21 @@ class Phase:
         The integral of mode times state at the state that is picked.
     holds : bool
         Without this, the integral is there, and nothing is held.
+    name : str
+        Of its state, behind ``phase_``; by default its number.
 
     Examples
     --------
-    >>> Phase(((0, 4, 1, 2.0),), 0.0).density(0, 0.5, [0, 0, 0, 0, 3.0, 0, 0], 1)
+    >>> Phase(((0, 4, 1, 2.0),)).density(0, 0.5, [0, 0, 0, 0, 3.0, 0, 0], None, 1)
     -6.0
     """
 
     terms: tuple[tuple[int, int, int, float], ...]
-    level: float
+    level: float = 0.0
     holds: bool = True
+    name: str = ""
 
-    def density(self, member: int, t, x, count: int):
+    def density(self, member: int, t, x, p, count: int):
         """Return what is integrated over one of ``count`` members, from t and its states x."""
         own = [term for term in self.terms if term[0] == member]
         shapes = {wave: _wave(math, wave, t) for _, _, wave, _ in own}
@@ -56,6 +59,19 @@ class Phase:
         for _, state, wave, factor in own:
             value = value + factor * shapes[wave] * x[state]
         return value
+
+
+#: Phases of one strip by name: they fix the angle about the tangent (a homogeneous ring, an isotropic rod between ends on one
+#: line), the place along a closed strip that is twisted to the right or to the left, and along a ring that buckles with two
+#: waves. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0 lose their slope on the way to a Moebius
+#: band of a flat strip; with +3 they keep it.)
+PHASES = {
+    name: Phase(terms, name=name.replace(", ", "_").replace(" ", "_"))
+    for name, terms in {
+        "spin": ((0, 4, 0, 1.0),), "shift, right": ((0, 4, 0, 1.0), (0, 5, -1, 3.0)),
+        "shift, left": ((0, 4, 0, 1.0), (0, 5, -1, -3.0)), "shift, two waves": ((0, 4, -2, 1.0),),
+    }.items()
+}  # fmt: skip
 
 
 def _wave(functions, wave: int, t):

@@ -128,6 +128,7 @@ class NetworkDirections(Strict):
     """Where loads point to."""
 
     weight: Axis = (0.0, -1.0, 0.0)
+    foundation: Axis = Field((0.0, 1.0, 0.0), description="the normal of the plane from which a foundation holds")
     pressure: Axis = Field((1.0, 0.0, 0.0), description="the normal of the plane, about which the strips go around an area")
     field: Axis = Field((0.0, 1.0, 0.0), description="of a uniform field on magnetized strips")
 
@@ -304,7 +305,7 @@ class NetworkScene(StagedScene):
         if changed:  # a support that is let go has no numbers
             known = Network(sections, members, joints, held, loads, {}, *directions).known
             numbers = {name: value for name, value in numbers.items() if name in known}
-        return Network(sections, members, joints, held, loads, numbers, *directions)
+        return Network(sections, members, joints, held, loads, numbers, *directions, foundation_direction=where.foundation)
 
     def _sections(self) -> dict[str, Section]:
         given = self.sections if self.material is None else {"strip": self.material}

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from contin import solve, trace
-from ribbon_model.ends import CLAMP, FREE_END, HINGED, End, hinge, product
+from ribbon_model.ends import CLAMP, FREE_END, HINGED, End, Support, hinge, product
 from ribbon_model.laws import FINITE_WIDTH, RIBBON, ROD
 from ribbon_model.network import BALL, FINISH, HINGE, START, Joint, JointEnd, Load, Member, Network, straight
 from ribbon_model.open_strip import OpenStrip
@@ -270,6 +270,23 @@ def test_an_arm_carries_the_load_aside():
     assert abs(moment[0]) == pytest.approx(1e-5, rel=1e-3)
 
 
+def test_a_beam_on_a_foundation_of_two_pieces_away_from_the_origin():
+    """Hinged, it buckles at n**2 pi**2 + k/(n pi)**2 (Hetenyi 1946), here n = 1."""
+    beam = straight("strip", (1, 2, 3), (1, 2, 4), (0, 1, 0))
+    pieces = dict(zip(("a", "b"), beam.cut([0.4])))
+    joints = {
+        "A": Joint([JointEnd("a")]),
+        "K": Joint([JointEnd("a", FINISH), JointEnd("b")]),
+        "B": Joint([JointEnd("b", FINISH)]),
+    }
+    held = {"A": hinge(), "B": Support(HINGED, held=((1, 0, 0), (0, 1, 0)), numbers=("x", "y", "", "turn", "bend", "swing"))}
+    load = {"P": Load([("B", (0.0, 0.0, -1.0), (0.0, 0.0, 0.0))])}
+    network = Network({"strip": _rod(B2=50.0)}, pieces, joints, held, load, {"P": 0.0, "foundation": 100.0})
+    assert {"x", "y", "bend"} <= set(network.parameters) and "B_dx" not in network.known
+    branch = trace(network.first_point()[0], free=["P"], limits={"P": (0, 30)})
+    assert _changes(branch, "P") == [(pytest.approx(math.pi**2 + 100 / math.pi**2, rel=1e-9), (0, 1))]
+
+
 # --- statements -----------------------------------------------------------------------------------------------------------
 
 
@@ -279,6 +296,16 @@ def _stated(**changes):
         "joints": {"A": Joint([JointEnd("a")]), "K": Joint([JointEnd("a", FINISH), JointEnd("b")])}, "held": {"A": CLAMP},
     }  # fmt: skip
     return Network(**(given | changes))
+
+
+def test_what_is_drawn_without_stress_is_not_assembled():
+    assert "assembly" not in _stated().parameters
+    turned = {"K": Joint([JointEnd("a", FINISH), JointEnd("b", angle="turned")])}
+    for changes in (
+        {"numbers": {"weight": 1.0}}, {"sections": {"strip": _rod(kappa_n=0.5)}}, {"members": {"a": Member(), "b": Member()}},
+        {"joints": _stated().joints | turned, "numbers": {"turned": 0.1}},
+    ):  # fmt: skip
+        assert "assembly" in _stated(**changes).parameters
 
 
 @pytest.mark.parametrize(

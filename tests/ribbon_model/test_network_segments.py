@@ -11,7 +11,8 @@ from ribbon_model.descent import descend, modes
 from ribbon_model.network_segments import cut, unsupported
 
 ROOT = Path(__file__).parents[2]
-#: Supports of three kinds, joints of three kinds, an angle, arms, a dead force at an arm, a moment at a hinge, weight.
+#: Supports of three kinds, joints of three kinds, an angle, arms, a dead force at an arm, a moment at a hinge, weight,
+#: a foundation.
 EVERYTHING = """
 material: {law: rod, B1: 1.0, B2: 2.0, C: 0.75, kappa_n: 0.3}
 strips:
@@ -32,7 +33,8 @@ held:
 loads:
   P: {pin: {force: [0.3, -1, 0.2], arm: [0.1, 0.2, 0.0]}, d at 0.4: [0.4, 0, 1]}
   M: {A: {moment: 1.0}}
-numbers: {P: 1.5, M: 0.7, weight: 2.0, B_bend: 0.2}
+numbers: {P: 1.5, M: 0.7, weight: 2.0, foundation: 1.0, B_bend: 0.2}
+directions: {foundation: [0.2, 1, -0.4]}
 stages: [{follow: P, to: 2.0}]
 """
 
