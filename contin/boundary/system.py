@@ -22,7 +22,7 @@ from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolat
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
-from contin.core.system import Scales, System, largest_entries, usual
+from contin.core.system import Inputs, Scales, System, Term, largest_entries, usual
 from contin.core.trial import Event
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
@@ -38,8 +38,6 @@ from contin.problems.statement import Statement
 _ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies", "_spectra_found")
 
 
-#: Times, states, states at the other end and parameters at which functions are evaluated.
-_At = tuple[Array, Array, Array, Array]
 #: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
 #: than by one kernel, three the same, ten a twentieth of the time.
 _APART = 30
@@ -146,10 +144,6 @@ class Collocation(System):
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (N d + 1, n)."""
         return self._scaled_states(x) * self.scales.states
-
-    def _scaled_states(self, x: Array) -> Array:
-        """Return the states divided by their sizes, a view of x."""
-        return x[: self.state_size].reshape(-1, self._n)
 
     def at_gauss_points(self, x: Array) -> Array:
         """Return the states divided by their sizes at the Gauss points, shape (N d, n)."""
@@ -279,37 +273,45 @@ class Collocation(System):
         """Boundary conditions, compiled."""
         return self._batch("boundary", ("boundary",))
 
-    @functools.cached_property
-    def _functionals(self) -> Batch:
-        """Functionals, with scaled inputs."""
-        return self._batch("functionals")
+    _functions = "field", "boundary"
 
     @property
-    def _evaluated(self) -> Sequence[Batch]:
-        """Right-hand side with integrands, and boundary conditions; in the user's units, too."""
-        return self._field, self._boundary, self.problem.batch("field"), self.problem.batch("boundary")
+    def _terms(self) -> tuple[Term, Term]:
+        """Those of the Gauss points, and of both ends."""
+        n, first, problem = self._n, self._inner, self.problem
+        last = first + problem.boundary_size
 
-    def _inside(self, x: Array) -> _At:
+        def rows(f: Array) -> Array:
+            conditions, further = np.zeros(problem.boundary_size), np.zeros(self._further)
+            return np.concatenate([-(self._h_points * f[:, :n]).ravel(), conditions, self.gauss_weights @ f[:, n:], further])
+
+        def weights(w: Array) -> Array:
+            integrals = self.gauss_weights[:, None] * w[last : self._conditions]
+            return np.hstack([-self._h_points * w[:first].reshape(-1, n), integrals])
+
+        def rows_at_ends(f: Array) -> Array:
+            return np.concatenate([np.zeros(first), f[0], np.zeros(self.equations - last)])
+
+        def by_x(slopes: Array) -> Array:
+            return np.insert(slopes[0], n, np.zeros(self.state_size - 2 * n))
+
+        inside = Term(self, self._field, self._inside, rows, weights, self._to_nodes)
+        return inside, Term(self, self._boundary, self._at_ends, rows_at_ends, lambda w: w[None, first:last], by_x)
+
+    @property
+    def _means(self) -> Term:
+        """Integrals of the functionals."""
+        widths = self.gauss_weights
+        return Term(self, self._functionals, self._inside, lambda f: widths @ f, lambda w: np.outer(widths, w), self._to_nodes)
+
+    def _inside(self, x: Array) -> Inputs:
         """Return where functions of t are evaluated: at the Gauss points."""
         return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
 
-    def _inside_unscaled(self, x: Array) -> _At:
-        """Return the same in the user's units."""
-        return self.gauss_times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
-
-    def _at_ends(self, x: Array) -> _At:
+    def _at_ends(self, x: Array) -> Inputs:
         """Return where boundary conditions are evaluated."""
         u = self._scaled_states(x)
         return _TIME, u[:1], u[-1:], self._scaled_parameters(x)
-
-    def evaluations(self, x: Array) -> list[tuple[Batch, Array, Array, Array, Array]]:
-        """Return right-hand side with integrands, and boundary conditions, in the user's units."""
-        ends = _TIME, self.states(x)[:1], self.states(x)[-1:], self.all_parameters(x)
-        return [(self.problem.batch("field"), *self._inside_unscaled(x)), (self.problem.batch("boundary"), *ends)]
-
-    def _both_ends(self, v: Array) -> Array:
-        """Return the states at both ends side by side, shape (1, 2 n)."""
-        return np.concatenate([v[: self._n], v[self.state_size - self._n : self.state_size]])[None]
 
     # --- F and F_x -----------------------------------------------------------------------------------------------
 
@@ -337,18 +339,6 @@ class Collocation(System):
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
         """Return what vanishes besides, shape (q,), and its derivatives by x, shape (q, size)."""
         return np.empty(0), np.empty((0, self.size))
-
-    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return their derivatives by any parameters, shape (q, len(names)); 0 where they contain none."""
-        return np.zeros((self._further, len(names)))
-
-    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
-        return np.zeros(self._further)
-
-    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of their derivative along v, multiplied by w (q,), shape (size,); 0 where they are linear."""
-        return np.zeros(self.size)
 
     # --- F_x -----------------------------------------------------------------------------------------------------
 
@@ -445,23 +435,10 @@ class Collocation(System):
         residual, factors = self._linearized(x, np.concatenate([own, rows]), inside)
         return np.concatenate([residual, values]), factors
 
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
-        n, which = self._n, self._indices(names)
-        of_field, of_boundary = (self.problem.batch(name).columns(which, ()) for name in ("field", "boundary"))
-        field = self._field.jacobian(*self._inside(x), of_field)[1]
-        ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
-        collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
-        integrals = np.einsum("p,pqk->qk", self.gauss_weights, field[:, n:])
-        return np.concatenate([collocation, ends, integrals, self.condition_columns(x, names)])
-
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,), for w (equations,)."""
-        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
-        entries, slopes = self._field.entries(*self._inside(x), of_field)[1], np.zeros((of_field.width, self.gauss_times.size))
-        np.add.at(slopes, of_field.places, (self._at_points(w)[:, of_field.rows] * entries).T)
-        ends = w[self._inner : self._inner + self.problem.boundary_size]
-        result = self._to_nodes(slopes.T, ends @ self._boundary.jacobian(*self._at_ends(x), of_ends)[1][0])
+        inside, ends = self._terms
+        result = inside.transposed(x, w) + ends.transposed(x, w)
         rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
         np.add.at(result[: self.state_size].reshape(-1, self._n), self._by_interval, rates)
         return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
@@ -471,14 +448,6 @@ class Collocation(System):
         """Number of collocation conditions."""
         return self.gauss_times.size * self._n
 
-    def _at_points(self, w: Array) -> Array:
-        """Return the weights of right-hand side and integrands at the Gauss points in w.F, shape (N d, n + n_int)."""
-        n = self._n
-        weights = np.empty((self.gauss_times.size, n + self.problem.integral_size))
-        weights[:, :n] = -self._h_points * w[: self._inner].reshape(-1, n)
-        weights[:, n:] = self.gauss_weights[:, None] * w[self._inner + self.problem.boundary_size : self._conditions]
-        return weights
-
     def _row_sizes(self, x: Array) -> dict[str, Array]:
         """Return the largest entries of the rows of boundary and integral conditions."""
         of_field, of_boundary = self._columns
@@ -486,74 +455,19 @@ class Collocation(System):
         field = self._field.jacobian(*self._inside(x), of_field)[1][:, self._n :]
         return {"boundary": np.abs(ends).max(axis=1, initial=0.0), "integrals": np.abs(field).max(axis=(0, 2), initial=0.0)}
 
-    # --- further derivatives -------------------------------------------------------------------------------------
-
-    def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (equations,); the part with u' is linear."""
-        n = self._n
-        field = self._field.along(*self._inside(x), [self._wide(v, self.at_gauss_points(v)) for v in directions])
-        boundary = self._boundary.along(*self._at_ends(x), [self._wide(v, self._both_ends(v)) for v in directions])[0]
-        integrals, own = self.gauss_weights @ field[:, n:], self.conditions_along(x, directions)
-        return np.concatenate([-(self._h_points * field[:, :n]).ravel(), boundary, integrals, own])
-
-    def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
-        of_field, of_ends = (self.problem.batch(name).columns(self._free) for name in ("field", "boundary"))
-        inside, both = self._wide(v, self.at_gauss_points(v)), self._wide(v, self._both_ends(v))
-        ends = w[None, self._inner : self._inner + self.problem.boundary_size]
-        slopes = self._field.bent(*self._inside(x), self._at_points(w), inside, of_field)
-        found = self._to_nodes(slopes, self._boundary.bent(*self._at_ends(x), ends, both, of_ends)[0])
-        return found + self.conditions_bent(x, w[self._conditions :], v) if self._further else found
-
-    def _to_nodes(self, slopes: Array, at_ends: Array | None = None) -> Array:
-        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k).
-
-        ``at_ends`` (2 n + k,) are further ones by the states at both ends and the free parameters.
-        """
+    def _to_nodes(self, slopes: Array) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
         n, by_points = self._n, slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
         by_node = np.zeros((self.nodes.size, n))
         np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
-        result = np.append(by_node.ravel(), slopes[:, n:].sum(axis=0))
-        if at_ends is not None:
-            result[:n] += at_ends[:n]
-            result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
-            result[self.state_size :] += at_ends[2 * n :]
-        return result
+        return np.append(by_node.ravel(), slopes[:, n:].sum(axis=0))
 
     # --- functionals ---------------------------------------------------------------------------------------------
-
-    @property
-    def integrated(self) -> tuple[str, ...]:
-        """Names of the functionals that are integrals, in the order of the compiled functions."""
-        return tuple(self.problem.functionals)
-
-    def functionals(self, x: Array) -> Array:
-        """Return the values of the problem's functionals, in their order, by the same quadrature."""
-        if not self.problem.functionals:
-            return np.empty(0)
-        return self.gauss_weights @ self.problem.batch("functionals").values(*self._inside_unscaled(x))
 
     def integrands(self, x: Array, times: Array, points: Array) -> Array:
         """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
         batch: Batch = self.problem.batch("functionals")
         return batch.values(times, points * self.scales.states, _NONE(self._n), self.all_parameters(x))
-
-    def column_gradient(self, x: Array, name: str) -> Array | None:
-        """Return the derivatives of a parameter or functional by x, shape (size,); None where they are not known."""
-        if name not in self.integrated:
-            return super().column_gradient(x, name)
-        batch, at = self._functionals, self.integrated.index(name)
-        slopes = batch.jacobian(*self._inside(x), batch.columns(self._free))[1][:, at]
-        return self._to_nodes(self.gauss_weights[:, None] * slopes)
-
-    def column_bent(self, x: Array, name: str, v: Array) -> Array:
-        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
-        if name not in self.integrated:
-            return super().column_bent(x, name, v)
-        batch, weights = self._functionals, np.zeros((self.gauss_times.size, len(self.integrated)))
-        weights[:, self.integrated.index(name)] = self.gauss_weights
-        wide = self._wide(v, self.at_gauss_points(v))
-        return self._to_nodes(batch.bent(*self._inside(x), weights, wide, batch.columns(self._free)))
 
     # --- errors --------------------------------------------------------------------------------------------------
 
@@ -706,7 +620,7 @@ class Collocation(System):
     def _sizes_of(self, name: str, x: Array) -> Array:
         """Return the sizes of what the values of a function are integrated to."""
         with np.errstate(all="ignore"):
-            values = np.abs(self.problem.batch(name).values(*self._inside_unscaled(x))).max(axis=0)
+            values = np.abs(self._batch(name).values(*self._inside(x))).max(axis=0)
         largest: Array = (self.mesh[-1] - self.mesh[0]) * np.nan_to_num(values)
         largest[largest == 0] = 1.0
         if name == "field":

@@ -130,11 +130,11 @@ class ConnectionCollocation(Collocation):
         """Where the coordinates of the equilibria begin among all parameters."""
         return list(self.problem.parameters).index(self.problem.multipliers[0])
 
-    def _jacobian_at(self, place: Array, p: Array) -> Array:
-        """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
+    def _jacobians_at(self, places: Array, p: Array, directions: Sequence[Array] = ()) -> Array:
+        """Return the derivatives of the field by the states at places, scaled, or theirs along directions of all inputs."""
         batch, n, sizes = self.problem.batch("vector field"), self._n, self.scales.states
-        jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
-        return jacobian * sizes / sizes[:, None]
+        given = np.zeros(len(places)), places, np.empty((0, n)), p, batch.columns([])
+        return batch.jacobian_along(*given, directions)[:, :n] * sizes / sizes[:, None]
 
     def _linear_at_ends(self, p: Array) -> list[_Linear]:
         """Return the linearized fields at both equilibria, once for values of all parameters.
@@ -146,7 +146,7 @@ class ConnectionCollocation(Collocation):
         """
 
         def made(place: Array) -> _Linear:
-            jacobian = self._jacobian_at(place[0], p)
+            (jacobian,) = self._jacobians_at(place, p)
             if not np.isfinite(jacobian).all():
                 where = not_finite(Place(self.problem.batch("vector field"), 0.0, [*place[0], *p]))
                 raise ConvergenceError(f"the Jacobian of the vector field at the equilibrium is not finite: {where}")
@@ -225,13 +225,10 @@ class ConnectionCollocation(Collocation):
 
         Of subsets that stand for the same directions only the first is there (`contin.core.differences.alike`).
         """
-        batch, sizes = self.problem.batch("vector field"), self.scales.states
-        place = self._places(p[None])[end]
+        place, same = self._places(p[None])[end], classes(directions)
         moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
-        given = np.zeros(1), place, np.empty((0, self._n)), p, batch.columns([])
-        same = classes(directions)
         found = {
-            chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, : self._n] * sizes / sizes[:, None]
+            chosen: self._jacobians_at(place, p, [moves[i] for i in chosen])[0]
             for chosen in subsets(len(directions))[1:]
             if alike(same, chosen) == chosen
         }
@@ -276,13 +273,12 @@ class ConnectionCollocation(Collocation):
 
     def _by_parameters(self, x: Array, p: Array, directions: Array) -> Array:
         """Return the derivatives of projection and fold conditions along directions (m, all parameters), as columns."""
-        batch, n, sizes, count, found = self.problem.batch("vector field"), self._n, self.scales.states, len(directions), []
+        sizes, count, found = self.scales.states, len(directions), list[Array]()
         for (Q, L, solve), here, moves, apart in zip(
             self._subspaces(p), self._places(p[None]), self._places(directions), self.apart(x)
         ):
-            given = np.zeros(count), np.repeat(here, count, axis=0), np.empty((0, n)), p, batch.columns([])
-            fields = batch.jacobian_along(*given, [np.hstack([moves, directions])])[:, :, :n] * sizes / sizes[:, None]
-            turned = [solve(each) for each in L @ fields @ (np.eye(n) - Q.T @ L)]
+            fields = self._jacobians_at(np.repeat(here, count, axis=0), p, [np.hstack([moves, directions])])
+            turned = [solve(each) for each in L @ fields @ (np.eye(self._n) - Q.T @ L)]
             found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves / sizes).T)
         if self.problem.saddle_node:
             found.append(np.column_stack([self._fold_along(p, [each])[0,] for each in directions]))
@@ -317,23 +313,26 @@ class ConnectionCollocation(Collocation):
         parameters[self._free] = v[self.state_size :] * self.free_scales
         return v[: self.state_size], parameters
 
-    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of these conditions along several directions; the phase condition is linear."""
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions; the phase condition is linear."""
         states, parameters = zip(*(self._directions_of(v) for v in directions))
         p, every = self.all_parameters(x), tuple(range(len(directions)))
         rows = self._end_rows(x, self._subspaces_along(p, parameters), states, parameters)
-        return np.concatenate([rows, self._fold_along(p, parameters)[every], [0.0]])
+        found = super().along(x, directions)
+        found[self._conditions : -1] = np.append(rows, self._fold_along(p, parameters)[every])
+        return found
 
-    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(their derivative along v) by x: by the states at the ends, and by each free parameter."""
-        result, p, (states, along) = np.zeros(self.size), self.all_parameters(x), self._directions_of(v)
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v); that of the conditions by the states at the ends, and by each free parameter."""
+        result, w, p = super().bent(x, w, v), w[self._conditions :], self.all_parameters(x)
+        states, along = self._directions_of(v)
         for here, at, L in self._end_places(self._subspaces_along(p, [along])):
             result[at : at + self._n] += w[here] @ L[0,]
         still = np.zeros(self.state_size)
         for place, unit in enumerate(self._unit_directions(self._free)):
             own = unit * self.free_scales[place]
             rows = self._end_rows(x, self._subspaces_along(p, [along, own]), [states, still], [along, own])
-            result[self.state_size + place] = w[:-1] @ np.append(rows, self._fold_along(p, [along, own])[0, 1])
+            result[self.state_size + place] += w[:-1] @ np.append(rows, self._fold_along(p, [along, own])[0, 1])
         return result
 
     def condition_values(self, x: Array) -> Array:
@@ -345,9 +344,11 @@ class ConnectionCollocation(Collocation):
         values, by_states, by_parameters = self._conditions_at_ends(x, self.free)
         return values, np.hstack([by_states, by_parameters * self.free_scales])
 
-    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of these conditions by any parameters."""
-        return self._conditions_at_ends(x, names)[2] * self.scales.parameters[self._indices(names)]
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        found = super().parameter_columns(x, names)
+        found[self._conditions :] = self._conditions_at_ends(x, names)[2] * self.scales.parameters[self._indices(names)]
+        return found
 
     # --- in one call of a kernel -----------------------------------------------------------------------------------
 

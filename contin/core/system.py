@@ -13,18 +13,17 @@ import functools
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array, Indices, Pattern
 from contin.collocation.mesh import MeshControl
-from contin.core.differences import derivative
 from contin.core.protocol import Carrier, Discretization
 from contin.draws import ASIDE
 from contin.errors import ProblemError
-from contin.functions.batch import Batch
+from contin.functions.batch import Batch, Columns
 from contin.levels import LAST_PLACES
 from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
@@ -80,6 +79,62 @@ def usual(sizes: Array | float, stated: Pattern | bool = False) -> Array:
     sizes = np.abs(sizes)
     odd = np.isfinite(sizes) & (sizes > 0) & (stated | (sizes < USUAL[0]) | (sizes > USUAL[1]))
     return np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
+
+
+#: Times, states, states at the other end and parameters at which functions are evaluated.
+Inputs = tuple[Array, Array, Array, Array]
+
+
+class Term(NamedTuple):
+    """Functions f of K points, combined linearly into equations or columns: a part of F(x), x = (u, p),
+
+        R f(P u, p),     with the derivatives  R [ f_u P   f_p ],
+
+    P and R linear. ``inputs(x)`` are t, P u, states at the other end and parameters, as functions take them. ``rows`` takes
+    values (K, count) to R f, ``weights`` is R^T. ``by_x`` is P^T, with sums over the points for the free parameters: it takes
+    derivatives by the inputs (K, columns) to those by x.
+    """
+
+    system: System
+    batch: Batch
+    inputs: Callable[[Array], Inputs]
+    rows: Callable[[Array], Array]
+    weights: Callable[[Array], Array]
+    by_x: Callable[[Array], Array]
+
+    def values(self, x: Array) -> Array:
+        """Return R f."""
+        return self.rows(self.batch.values(*self.inputs(x)))
+
+    def slopes(self, x: Array, which: Indices) -> Array:
+        """Return the derivatives of f by any parameters, shape (K, count, their number)."""
+        return self.batch.jacobian(*self.inputs(x), self.batch.columns(which, ()))[1]
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of R f along several directions."""
+        return self.rows(self.batch.along(*self.inputs(x), [self._direction(v) for v in directions]))
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient by x of the derivative of w.R f along v."""
+        return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), self._columns))
+
+    def transposed(self, x: Array, w: Array) -> Array:
+        """Return the gradient by x of w.R f."""
+        columns, weights = self._columns, self.weights(w)
+        entries, slopes = self.batch.entries(*self.inputs(x), columns)[1], np.zeros((columns.width, len(weights)))
+        used = np.any(weights, axis=0)[columns.rows]  # the others may be infinite
+        np.add.at(slopes, columns.places[used], (weights[:, columns.rows] * entries)[:, used].T)
+        return self.by_x(slopes.T)
+
+    @property
+    def _columns(self) -> Columns:
+        """Columns of the derivatives by states and free parameters."""
+        return self.batch.columns(self.system._free)
+
+    def _direction(self, v: Array) -> Array:
+        """Return a direction of x as one of all inputs."""
+        _, states, other, _ = self.inputs(v)
+        return self.system._wide(v, np.hstack([states, other]) if len(other) else states)
 
 
 class System(Discretization):
@@ -226,29 +281,72 @@ class System(Discretization):
             unit = np.zeros(self.size)
             unit[at] = self.free_scales[at - self.state_size]
             return unit
+        if name in self.integrated:
+            return self._means.transposed(x, self._unit(name))
         return np.zeros(self.size) if name in self.problem.parameters else None
-
-    @abstractmethod
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
-
-    def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
-
-        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
-        differences of `transposed_product`.
-        """
-        longest = np.abs(v).max(initial=0.0)
-        if not longest:
-            return np.zeros(self.size)
-        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
-        longest = np.abs(v).max(initial=0.0)
-        if name in self.problem.parameters or not longest:
-            return np.zeros(self.size)
-        return derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
+        return self._means.bent(x, self._unit(name), v) if name in self.integrated else np.zeros(self.size)
+
+    def _unit(self, name: str) -> Array:
+        """Return the weights of the functionals in one of them."""
+        return np.array([float(other == name) for other in self.integrated])
+
+    # --- the functions of the statement ---------------------------------------------------------------------------
+
+    #: Names of the functions of the terms.
+    _functions: tuple[str, ...] = ()
+
+    @property
+    @abstractmethod
+    def _terms(self) -> Sequence[Term]:
+        """F, but for what is linear and for conditions beyond those of the problem."""
+
+    @property
+    @abstractmethod
+    def _means(self) -> Term:
+        """The functionals that `integrated` names."""
+
+    @property
+    def integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are functions, or integrals of them, in the order of the compiled functions."""
+        return tuple(self.problem.functionals)
+
+    @functools.cached_property
+    def _functionals(self) -> Batch:
+        """The functionals, of scaled inputs."""
+        return self._batch("functionals")
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals, in their order."""
+        return self._means.values(x) if self.integrated else np.empty(0)
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The functions that the equations are made of; in the user's units, too."""
+        return [*(term.batch for term in self._terms), *map(self.problem.batch, self._functions)]
+
+    def evaluations(self, x: Array) -> list[tuple[Batch, Array, Array, Array, Array]]:
+        """Return the functions that F is made of in the user's units, with the t, u, v and p that they are called with at x."""
+        sizes, p, given = self.scales.states, self.all_parameters(x), [term.inputs(x) for term in self._terms]
+        return [(self.problem.batch(name), t, u * sizes, v * sizes, p) for name, (t, u, v, _) in zip(self._functions, given)]
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,)."""
+        return np.sum([term.along(x, directions) for term in self._terms], axis=0)
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,), for w (equations,)."""
+        return np.sum([term.bent(x, w, v) for term in self._terms], axis=0)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        found, which = np.zeros((self.equations, len(names))), self._indices(names)
+        for term in self._terms:
+            for column, slopes in zip(found.T, np.moveaxis(term.slopes(x, which), 2, 0)):
+                column += term.rows(slopes)
+        return found
 
     def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
         """Return what a function returns, and the estimated relative error of the derivatives that it took.
@@ -265,17 +363,20 @@ class System(Discretization):
             batch.error = max(batch.error, known)
         return found, error
 
-    @property
-    def _evaluated(self) -> Sequence[Batch]:
-        """The functions that the equations are made of."""
-        return ()
-
     def _wide(self, v: Array, states: Array) -> Array:
-        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v."""
-        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
-        wide[:, : states.shape[1]] = states
-        wide[:, states.shape[1] + self._free] = v[self.state_size :]
+        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v.
+
+        Of a stack (count, size), or of states alone, they come one after the other.
+        """
+        n, last = states.shape[1], np.atleast_2d(v)[:, self.state_size :]
+        wide = np.zeros((len(states), n + len(self.parameters)))
+        wide[:, :n] = states
+        wide[:, n + self._free[: last.shape[1]]] = np.repeat(last, len(states) // len(last), axis=0)
         return wide
+
+    def _scaled_states(self, x: Array) -> Array:
+        """Return the states divided by their sizes, a view of x, shape (K, n)."""
+        return x[: self.state_size].reshape(-1, self.scales.states.size)
 
     @abstractmethod
     def refined(self) -> tuple[System, Carrier] | None:

@@ -215,8 +215,7 @@ class PeriodicCollocation(OfCycles, Collocation):
         found[round_] = self.circles[round_, None] * [0.5, -0.5]
         found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
-        means = super().functionals(x) if self.problem.means else np.empty(0)
-        return np.concatenate([found.ravel(), self._extremes_of_following(x), own, means])
+        return np.concatenate([found.ravel(), self._extremes_of_following(x), own, super().functionals(x)])
 
     def following(self, x: Array, times: Array) -> Array:
         """Return the states that follow from others at ``times`` (m,), shape (m, their number)."""
@@ -265,10 +264,8 @@ class PeriodicCollocation(OfCycles, Collocation):
 
     def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""
-        still, none = np.zeros(self.size), np.empty((0, self._n))
-        wide = [self._wide(still, states) for states in directions]
-        points, p = self.at_gauss_points(x), self._scaled_parameters(x)
-        return self._field.along(self.gauss_times, points, none, p, wide)[:, : self._n]
+        wide = [self._wide(np.zeros(self.state_size), states) for states in directions]
+        return self._field.along(*self._inside(x), wide)[:, : self._n]
 
     def _jacobian_of_field(self, x: Array) -> Array:
         """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
@@ -558,8 +555,7 @@ class CycleCollocation(PeriodicCollocation):
 
     def rates(self, x: Array, points: Array) -> Array:
         """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
-        n, times = self._n, np.zeros(len(points))
-        return self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
+        return self.field_values(np.zeros(len(points)), points, self._scaled_parameters(x))[:, : self._n]
 
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""

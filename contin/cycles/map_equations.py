@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -81,8 +82,8 @@ class MapSystem(OfCycles, Algebraic):
     # --- states --------------------------------------------------------------------------------------------------
 
     def states(self, x: Array) -> Array:
-        """Return the points of the cycle, shape (rounds, n)."""
-        return x[: self.state_size].reshape(self.rounds, self._n)
+        """Return the points of the cycle, shape (rounds, n), a view of x."""
+        return self._scaled_states(x)
 
     def pack(self, states: object, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from all points of a cycle, or from one of them, to which the map is applied."""
@@ -98,31 +99,18 @@ class MapSystem(OfCycles, Algebraic):
                 self.states(x)[at] = following
         return x
 
-    def functionals(self, x: Array) -> Array:
-        """Return the values of the problem's functionals at the first point, in their order."""
-        if not self.problem.functionals:
-            return np.empty(0)
-        return self.problem.batch("functionals").values(*self._arguments(x, self.states(x)[:1]))[0]
-
-    def column_gradient(self, x: Array, name: str) -> Array | None:
-        """Return the derivatives of a parameter or functional by x, shape (size,)."""
-        names = tuple(self.problem.functionals)
-        if name not in names:
-            return super(Algebraic, self).column_gradient(x, name)
-        batch = self.problem.batch("functionals")
-        here = batch.jacobian(*self._arguments(x, self.states(x)[:1]), batch.columns(self._free))[1][0, names.index(name)]
-        gradient = np.zeros(self.size)
-        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
-        return gradient
-
     # --- the equations -------------------------------------------------------------------------------------------
 
-    def _arguments(self, x: Array, states: Array) -> tuple[Array, Array, Array, Array]:
-        return np.zeros(len(states)), np.ascontiguousarray(states), np.empty((0, self._n)), self.all_parameters(x)
+    _functions = ("map",)
+
+    @functools.cached_property
+    def _residual(self) -> Batch:
+        """The map."""
+        return self.problem.batch("map")
 
     def _images(self, x: Array, states: Array) -> Array:
         """Return f at states (K, n), shape (K, n)."""
-        return self.problem.batch("map").values(*self._arguments(x, states))
+        return self._residual.values(np.zeros(len(states)), states, self._none, self.all_parameters(x))
 
     def _missed(self, x: Array, images: Array) -> Array:
         """Return f(u_j) - u_(j+1), shape (equations,), of the images f(u_j); the last one gains whole rounds of angles."""
@@ -175,8 +163,7 @@ class MapSystem(OfCycles, Algebraic):
 
     def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""
-        batch = self.problem.batch("map")
-        return batch.jacobian(*self._arguments(x, self.states(x)), batch.columns(self._indices(names)))
+        return self._residual.jacobian(*self._terms[0].inputs(x), self._residual.columns(self._indices(names)))
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, a sparse array where `is_sparse`."""
@@ -204,48 +191,10 @@ class MapSystem(OfCycles, Algebraic):
         places = np.append(rows.ravel(), at.ravel()), np.append(columns.ravel(), following.ravel())
         return residual, csr_array((entries, places), shape=(size, size + len(names)))
 
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
-        return self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
-
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several stacks of directions: f at every point; the rest is linear."""
-        n, count = self._n, len(directions[0])
-        wide = [np.zeros((count, self.rounds, n + len(self.parameters))) for _ in directions]
-        for inputs, stack in zip(wide, directions):
-            inputs[:, :, :n] = stack[:, : self.state_size].reshape(count, self.rounds, n)
-            inputs[:, :, n + self._free] = stack[:, None, self.state_size :] if stack.shape[1] > self.state_size else 0.0
-        given = self._arguments(x, np.tile(self.states(x), (count, 1)))
-        flat = [inputs.reshape(count * self.rounds, -1) for inputs in wide]
-        found: Array = self.problem.batch("map").along(*given, flat).reshape(count, -1)
-        if len(directions) == 1:
-            found = found - np.roll(directions[0][:, : self.state_size], -n, axis=1)
-        return found
-
-    def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v), shape (size,)."""
-        batch = self.problem.batch("map")
-        given = *self._arguments(x, self.states(x)), w.reshape(self.rounds, self._n), self._wide(v, self.states(v))
-        found = batch.bent(*given, batch.columns(self._free))
-        return np.append(found[:, : self._n].ravel(), found[:, self._n :].sum(axis=0))
-
-    def column_bent(self, x: Array, name: str, v: Array) -> Array:
-        """Return the derivative of `column_gradient` along v, shape (size,)."""
-        names = tuple(self.problem.functionals)
-        if name not in names:
-            return super(Algebraic, self).column_bent(x, name, v)
-        batch, weights = self.problem.batch("functionals"), np.zeros((1, len(names)))
-        weights[0, names.index(name)] = 1.0
-        given = *self._arguments(x, self.states(x)[:1]), weights, self._wide(v, self.states(v)[:1])
-        here = batch.bent(*given, batch.columns(self._free))[0]
-        gradient = np.zeros(self.size)
-        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
-        return gradient
-
-    @property
-    def _evaluated(self) -> Sequence[Batch]:
-        """The map."""
-        return (self.problem.batch("map"),)
+        found = super().stack_along(x, directions)
+        return found - np.roll(directions[0][:, : self.state_size], -self._n, axis=1) if len(directions) == 1 else found
 
     def transitions(self, x: Array) -> Array:
         """Return the derivatives of f by the states at all points, shape (rounds, n, n)."""
@@ -312,8 +261,7 @@ class MapSystem(OfCycles, Algebraic):
     @property
     def small_equations(self) -> Batch | None:
         """The map, of fixed points."""
-        known: Batch = self.problem.batch("map")
-        return known if type(self) is MapSystem and self.rounds == 1 else None
+        return self._residual if type(self) is MapSystem and self.rounds == 1 else None
 
     def form(self, x: Array) -> MapForm:
         """Return that of a cycle of the map."""

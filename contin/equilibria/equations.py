@@ -19,7 +19,7 @@ from contin.core.differences import derivative, of_lines
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import Spectral, may_be_on_axis, off_axis
-from contin.core.system import Scales, System, largest_entries, usual
+from contin.core.system import Inputs, Scales, System, Term, largest_entries, usual
 from contin.core.trial import Event, Trial
 from contin.defining.critical import HopfCurve, other_pairs
 from contin.draws import ASIDE, generator, signs
@@ -215,7 +215,7 @@ class Algebraic(Spectral, System):
 
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
-        return x[: self.state_size].reshape(1, -1) * self.scales.states
+        return self._scaled_states(x) * self.scales.states
 
     def lifted(self, x: Array, reference: Array) -> Array:
         """Return x with angles moved by whole rounds, so that they are nearest to those of a reference."""
@@ -228,8 +228,31 @@ class Algebraic(Spectral, System):
 
     def residual(self, x: Array) -> Array:
         """Return F at x, shape (equations,)."""
-        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        return self._residual.values(_NO_TIME, u, self._none, p)[0]
+        return self._terms[0].values(x)
+
+    _functions = ("residual",)
+
+    @property
+    def _terms(self) -> tuple[Term]:
+        return (self._of_points(self._residual),)
+
+    @property
+    def _means(self) -> Term:
+        return self._of_points(self._functionals, 1)
+
+    def _of_points(self, batch: Batch, count: int | None = None) -> Term:
+        """Return functions of the first points, or of all."""
+
+        def inputs(x: Array) -> Inputs:
+            u = np.ascontiguousarray(self._scaled_states(x)[:count])
+            return np.zeros(len(u)), u, self._none, self._scaled_parameters(x)
+
+        def by_x(slopes: Array) -> Array:
+            n = self._none.shape[1]
+            first, last = slopes[:, :n].ravel(), slopes[:, n:].sum(axis=0)
+            return np.concatenate([first, np.zeros(self.state_size - first.size), last])
+
+        return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), by_x)
 
     @functools.cached_property
     def _residual(self) -> Any:
@@ -276,8 +299,7 @@ class Algebraic(Spectral, System):
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
         batch, columns = self._deciding
-        given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
-        values, slopes = batch.jacobian(*given, columns)
+        values, slopes = batch.jacobian(*self._terms[0].inputs(x), columns)
         return values[0], slopes[0]
 
     @functools.cached_property
@@ -300,13 +322,9 @@ class Algebraic(Spectral, System):
         entries = self._by_unknowns.rows.size
         return self.state_size >= MANY and entries <= _FEW * self.size * self.equations
 
-    def evaluations(self, x: Array) -> list[tuple[Any, Array, Array, Array, Array]]:
-        """Return the residual, in the user's units."""
-        return [(self.problem.batch("residual"), _NO_TIME, self.states(x), self._none, self.all_parameters(x))]
-
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
-        given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
+        given = self._terms[0].inputs(x)
         if self.problem.jacobian is not None:
             check_given(self.problem, self.states(x)[0], self.all_parameters(x))
             return self._given_jacobian(x, given)
@@ -358,22 +376,6 @@ class Algebraic(Spectral, System):
             vstack([beside, csr_array(rows)]) if len(rows) else beside, len(rows), self.problem.solver
         )
 
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
-        which = self._indices(names)
-        u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
-        batch = self._residual
-        if self.problem.jacobian is not None:
-            return batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(which, ()))[1][0]
-        columns_of = batch.columns(which)
-        if self.is_sparse:
-            rows, places = columns_of.rows, columns_of.places
-            entries = batch.entries(_NO_TIME, u, self._none, p, columns_of)[1][0]
-            columns = np.zeros((self.equations, len(which)))
-            columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
-            return columns
-        return batch.jacobian(_NO_TIME, u, self._none, p, columns_of)[1][0, :, n:]
-
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
         return self._jacobian(x)[1].T @ w
@@ -384,15 +386,12 @@ class Algebraic(Spectral, System):
 
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return it along several stacks of directions, shape (K, size) each or, of states alone, (K, n); (K, equations)."""
-        n, count = self.state_size, len(directions[0])
-        if self.problem.jacobian is not None and self.problem.batch("residual").interpreted is not None:
+        size, count, (term,) = self.state_size, len(directions[0]), self._terms
+        if self.problem.jacobian is not None and term.batch.interpreted is not None:
             return np.array([self._along_given(x, [stack[k] for stack in directions]) for k in range(count)])
-        u, p = np.repeat(x[:n].reshape(1, -1), count, axis=0), self._scaled_parameters(x)
-        wide = [np.zeros((count, n + p.size)) for _ in directions]
-        for inputs, stack in zip(wide, directions):
-            inputs[:, :n] = stack[:, :n]
-            inputs[:, n + self._free] = stack[:, n:] if stack.shape[1] > n else 0.0
-        return self._residual.along(np.zeros(count), u, self._none, p, wide)
+        t, u, v, p = term.inputs(x)
+        wide = [self._wide(stack, stack[:, :size].reshape(-1, u.shape[1])) for stack in directions]
+        return term.batch.along(np.tile(t, count), np.tile(u, (count, 1)), v, p, wide).reshape(count, -1)
 
     def _along_given(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along directions by differences of the user's Jacobian, in place of the residual's.
@@ -411,16 +410,10 @@ class Algebraic(Spectral, System):
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""
-        if self.problem.batch("residual").interpreted is not None:
-            return super().bent(x, w, v)  # two Jacobians instead of one value for each entry
-        u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
-        wide = self._wide(v, v[None, :n])
-        return batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]
-
-    @property
-    def _evaluated(self) -> Sequence[Batch]:
-        """The residual; in the user's units, too."""
-        return self._residual, self.problem.batch("residual")
+        if self._residual.interpreted is None or not np.any(v):
+            return super().bent(x, w, v)
+        # two Jacobians instead of one value for each entry
+        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / np.abs(v).max())[0]
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
@@ -474,32 +467,6 @@ class Algebraic(Spectral, System):
             return nearest(self.as_field().field_jacobian(x), value)
         values = self.eigenvalues(x)
         return complex(values[np.argmin(np.abs(values - value))])
-
-    def functionals(self, x: Array) -> Array:
-        """Return the values of the problem's functionals, in their order."""
-        if not self.problem.functionals:
-            return np.empty(0)
-        return self.problem.batch("functionals").values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
-
-    def column_gradient(self, x: Array, name: str) -> Array | None:
-        """Return the derivatives of a parameter or functional by x, shape (size,)."""
-        names = tuple(self.problem.functionals)
-        if name not in names:
-            return super().column_gradient(x, name)
-        batch = self._batch("functionals")
-        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        return batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(self._free))[1][0, names.index(name)]
-
-    def column_bent(self, x: Array, name: str, v: Array) -> Array:
-        """Return the derivative of `column_gradient` along v, shape (size,)."""
-        names = tuple(self.problem.functionals)
-        if name not in names:
-            return super().column_bent(x, name, v)
-        batch, n = self._batch("functionals"), self.state_size
-        weights = np.zeros((1, len(names)))
-        weights[0, names.index(name)] = 1.0
-        given = _NO_TIME, x[:n].reshape(1, -1), self._none, self._scaled_parameters(x)
-        return batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
