@@ -287,13 +287,13 @@ class Collocation(System):
 
         def weights(w: Array) -> Array:
             integrals = self.gauss_weights[:, None] * w[last : self._conditions]
-            return np.hstack([-self._h_points * w[:first].reshape(-1, n), integrals])
+            return np.concatenate([-self._h_points * w[:first].reshape(-1, n), integrals], axis=1)
 
         def rows_at_ends(f: Array) -> Array:
             return np.concatenate([np.zeros(first), f[0], np.zeros(self.equations - last)])
 
         def by_x(slopes: Array) -> Array:
-            return np.insert(slopes[0], n, np.zeros(self.state_size - 2 * n))
+            return np.concatenate([slopes[0, :n], np.zeros(self.state_size - 2 * n), slopes[0, n:]])
 
         inside = Term(self, self._field, self._inside, rows, weights, self._to_nodes)
         return inside, Term(self, self._boundary, self._at_ends, rows_at_ends, lambda w: w[None, first:last], by_x)
@@ -302,7 +302,7 @@ class Collocation(System):
     def _means(self) -> Term:
         """Integrals of the functionals."""
         widths = self.gauss_weights
-        return Term(self, self._functionals, self._inside, lambda f: widths @ f, lambda w: np.outer(widths, w), self._to_nodes)
+        return Term(self, self._functionals, self._inside, lambda f: widths @ f, lambda w: widths[:, None] * w, self._to_nodes)
 
     def _inside(self, x: Array) -> Inputs:
         """Return where functions of t are evaluated: at the Gauss points."""

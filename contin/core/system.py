@@ -81,7 +81,7 @@ def usual(sizes: Array | float, stated: Pattern | bool = False) -> Array:
     return np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
 
 
-#: Times, states, states at the other end and parameters at which functions are evaluated.
+#: Times, states, states at the other end and parameters: what functions are called with.
 Inputs = tuple[Array, Array, Array, Array]
 
 
@@ -90,9 +90,9 @@ class Term(NamedTuple):
 
         R f(P u, p),     with the derivatives  R [ f_u P   f_p ],
 
-    P and R linear. ``inputs(x)`` are t, P u, states at the other end and parameters, as functions take them. ``rows`` takes
-    values (K, count) to R f, ``weights`` is R^T. ``by_x`` is P^T, with sums over the points for the free parameters: it takes
-    derivatives by the inputs (K, columns) to those by x.
+    P and R linear. ``inputs(x)`` are t, P u, states at the other end and parameters. ``rows`` takes values (K, count) to R f,
+    ``weights`` is R^T. ``by_x`` is P^T, with sums over the points for the free parameters: it takes derivatives by the inputs
+    (K, columns) to those by x.
     """
 
     system: System
@@ -106,9 +106,9 @@ class Term(NamedTuple):
         """Return R f."""
         return self.rows(self.batch.values(*self.inputs(x)))
 
-    def slopes(self, x: Array, which: Indices) -> Array:
-        """Return the derivatives of f by any parameters, shape (K, count, their number)."""
-        return self.batch.jacobian(*self.inputs(x), self.batch.columns(which, ()))[1]
+    def slopes(self, x: Array, columns: Columns) -> Array:
+        """Return derivatives of f, shape (K, count, columns)."""
+        return self.batch.jacobian(*self.inputs(x), columns)[1]
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of R f along several directions."""
@@ -116,25 +116,24 @@ class Term(NamedTuple):
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient by x of the derivative of w.R f along v."""
-        return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), self._columns))
+        return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), self.columns))
 
     def transposed(self, x: Array, w: Array) -> Array:
         """Return the gradient by x of w.R f."""
-        columns, weights = self._columns, self.weights(w)
+        columns, weights = self.columns, self.weights(w)
         entries, slopes = self.batch.entries(*self.inputs(x), columns)[1], np.zeros((columns.width, len(weights)))
-        used = np.any(weights, axis=0)[columns.rows]  # the others may be infinite
-        np.add.at(slopes, columns.places[used], (weights[:, columns.rows] * entries)[:, used].T)
+        np.add.at(slopes, columns.places, (weights[:, columns.rows] * entries).T)
         return self.by_x(slopes.T)
 
     @property
-    def _columns(self) -> Columns:
+    def columns(self) -> Columns:
         """Columns of the derivatives by states and free parameters."""
         return self.batch.columns(self.system._free)
 
     def _direction(self, v: Array) -> Array:
         """Return a direction of x as one of all inputs."""
         _, states, other, _ = self.inputs(v)
-        return self.system._wide(v, np.hstack([states, other]) if len(other) else states)
+        return self.system._wide(v, np.concatenate([states, other], axis=1) if len(other) else states)
 
 
 class System(Discretization):
@@ -282,7 +281,8 @@ class System(Discretization):
             unit[at] = self.free_scales[at - self.state_size]
             return unit
         if name in self.integrated:
-            return self._means.transposed(x, self._unit(name))
+            term, at = self._means, self.integrated.index(name)
+            return term.by_x(term.weights(self._unit(name))[:, at, None] * term.slopes(x, term.columns)[:, at])
         return np.zeros(self.size) if name in self.problem.parameters else None
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
@@ -334,18 +334,19 @@ class System(Discretization):
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several directions, shape (equations,)."""
-        return np.sum([term.along(x, directions) for term in self._terms], axis=0)
+        return functools.reduce(np.add, [term.along(x, directions) for term in self._terms])
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,), for w (equations,)."""
-        return np.sum([term.bent(x, w, v) for term in self._terms], axis=0)
+        return functools.reduce(np.add, [term.bent(x, w, v) for term in self._terms])
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         found, which = np.zeros((self.equations, len(names))), self._indices(names)
         for term in self._terms:
-            for column, slopes in zip(found.T, np.moveaxis(term.slopes(x, which), 2, 0)):
-                column += term.rows(slopes)
+            slopes = term.slopes(x, term.batch.columns(which, ()))
+            for k in range(len(names)):
+                found[:, k] += term.rows(slopes[:, :, k])
         return found
 
     def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
@@ -366,12 +367,11 @@ class System(Discretization):
     def _wide(self, v: Array, states: Array) -> Array:
         """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v.
 
-        Of a stack (count, size), or of states alone, they come one after the other.
+        v has the shape (size,) or (K, size), or no free parameters.
         """
-        n, last = states.shape[1], np.atleast_2d(v)[:, self.state_size :]
-        wide = np.zeros((len(states), n + len(self.parameters)))
-        wide[:, :n] = states
-        wide[:, n + self._free[: last.shape[1]]] = np.repeat(last, len(states) // len(last), axis=0)
+        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
+        wide[:, : states.shape[1]] = states
+        wide[:, states.shape[1] + self._free[: v.shape[-1] - self.state_size]] = v[..., self.state_size :]
         return wide
 
     def _scaled_states(self, x: Array) -> Array:

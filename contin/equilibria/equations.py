@@ -232,7 +232,7 @@ class Algebraic(Spectral, System):
 
     _functions = ("residual",)
 
-    @property
+    @functools.cached_property
     def _terms(self) -> tuple[Term]:
         return (self._of_points(self._residual),)
 
@@ -249,7 +249,7 @@ class Algebraic(Spectral, System):
 
         def by_x(slopes: Array) -> Array:
             n = self._none.shape[1]
-            first, last = slopes[:, :n].ravel(), slopes[:, n:].sum(axis=0)
+            first, last = slopes[:, :n].ravel(), np.add.reduce(slopes[:, n:])
             return np.concatenate([first, np.zeros(self.state_size - first.size), last])
 
         return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), by_x)
@@ -389,9 +389,9 @@ class Algebraic(Spectral, System):
         size, count, (term,) = self.state_size, len(directions[0]), self._terms
         if self.problem.jacobian is not None and term.batch.interpreted is not None:
             return np.array([self._along_given(x, [stack[k] for stack in directions]) for k in range(count)])
-        t, u, v, p = term.inputs(x)
-        wide = [self._wide(stack, stack[:, :size].reshape(-1, u.shape[1])) for stack in directions]
-        return term.batch.along(np.tile(t, count), np.tile(u, (count, 1)), v, p, wide).reshape(count, -1)
+        _, u, v, p = term.inputs(x)
+        wide = [self._wide(stack.repeat(len(u), 0), stack[:, :size].reshape(-1, u.shape[1])) for stack in directions]
+        return term.batch.along(np.zeros(len(wide[0])), np.concatenate([u] * count), v, p, wide).reshape(count, -1)
 
     def _along_given(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along directions by differences of the user's Jacobian, in place of the residual's.
