@@ -35,7 +35,7 @@ from contin.levels import APART, LOCATED
 from contin.problems.statement import MOST_CONDITIONS, declared
 from contin.results.point import Point
 from contin.results.record import system_of
-from contin.search.guess import Guess, Options, first_guess, with_guessed_multipliers
+from contin.search.guess import Guess, first_guess, parsed, with_guessed_multipliers
 from contin.search.solving import deflated, solved
 from contin.text import exact_text
 
@@ -323,7 +323,8 @@ class Site:
         """Return a guess of the user, on a mesh like that of a known solution."""
         values = dict(zip(system.problem.parameters, map(float, system.parameters)))
         problem: Any = system.problem
-        return first_guess(problem, guess, Options(values, system.free, max(system.intervals, 1), system.degree))
+        given = parsed(problem, guess, values)
+        return first_guess(problem, given, values, system.free, max(system.intervals, 1), system.degree)
 
     def _beside(self, system: System, x: Array, account: Searched) -> Point | None:
         """Return a solution that is not known, from the deflated iteration or, where that finds none, damped steps from x."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -157,115 +157,134 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
 Guess = Callable[[float], Any] | Point | float | Sequence[Any] | Array | None
 
 
-@dataclass(frozen=True)
-class Options:
-    """Parameters and first mesh of a solution; as in `contin.solve`."""
+class Parsed(NamedTuple):
+    """A guess of any form, as states over t.
 
-    parameters: Mapping[str, float]
-    free: Sequence[str]
-    intervals: int
-    degree: int
+    Attributes
+    ----------
+    at : callable
+        Returns states (K, n) at places t (K,); of numbers, which depend on no t, in one row.
+    places : ndarray
+        Where arrays are given; the beginning of the domain for the other forms.
+    point : Point, optional
+        The guess itself where it is a solution with the states of the problem.
+    told : dict
+        Parameters that an orbit tells: its time, and the equilibria at its ends.
+    """
+
+    at: Callable[[Array], Array]
+    places: Array
+    point: Point | None = None
+    told: Mapping[str, float] = {}
+
+    def states(self, t: Array, count: int) -> Array:
+        """Return ``count`` states at places t (K,), shape (K, count)."""
+        found = self.at(t)
+        if found.shape[1] != count and self.point is not None:
+            raise ProblemError(f"guess: a Point of {found.shape[1]} states for a problem of {count}")
+        if found.shape[1] != count:
+            raise ProblemError(f"guess: {found.shape[1]} numbers, must be the {count} states")
+        return np.broadcast_to(found, (len(t), count))
+
+    def mapped(self, function: Callable[[Array], Array], count: int) -> Parsed:
+        """Return the guess for a problem whose states are a function of these."""
+        return Parsed(lambda t: function(self.states(t, count)), self.places)
 
 
-def restated(problem: object, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
+def parsed(problem: Any, guess: Guess, parameters: Mapping[str, float]) -> Parsed:
+    """Return a guess of any form as states over t; without one those of a problem without t are zeros.
+
+    Raises
+    ------
+    ProblemError
+        There is none, it is not numbers, or arrays have another size or domain.
+    """
+    begin = np.array(problem.domain or (0.0,))[:1]
+    if isinstance(guess, Point):
+        guess = underlying(guess)
+        system: Any = guess.system
+        x = guess.x
+        if problem.domain is None or not system.is_function_of_t:
+            return Parsed(lambda t: system.states(x)[:1], begin, guess)
+        return Parsed(lambda t: system.evaluate(x, t * system.order), begin, guess)
+    if problem.domain is not None:
+        if guess is None:
+            raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
+        guess = problem.whole_guess(guess, {**problem.parameters, **parameters})
+        if callable(guess):
+            return Parsed(functools.partial(_called, guess, problem), begin)
+        if isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray)):
+            return _of_arrays(problem, _numbers(guess[0]), _numbers(guess[1]))
+    numbers = _numbers(np.zeros(problem.dimension) if guess is None else guess).reshape(1, -1)
+    return Parsed(lambda t: numbers, begin)
+
+
+def _called(guess: Callable[[float], Any], problem: Any, t: Array) -> Array:
+    """Return the values of a user's function at places (K,), shape (K, n)."""
+    try:
+        values = [guess(place) for place in t]
+    except Exception as error:  # a user's function may raise anything
+        raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
+    return _continuous(np.array([_numbers(value, problem.dimension) for value in values]), periods_of(problem))
+
+
+def _of_arrays(problem: Any, t: Array, states: Array) -> Parsed:
+    """Return arrays (t, states); an orbit that has its own time over [0, 1]."""
+    told: dict[str, float] = {}
+    if states.size != t.size * problem.dimension:
+        raise ProblemError(f"guess: {states.size} numbers for {t.size} places t and {problem.dimension} states")
+    states, (a, b) = states.reshape(t.size, -1), problem.domain
+    if problem.own_time is not None and t.size > 1:
+        told = dict(zip(problem.ends, states[[0, -1]].ravel().tolist()))
+        time = t[-1] - t[0]
+        if abs(t[0]) > LOCATED or abs(time - 1) > LOCATED:
+            told |= {problem.own_time: float(time)} if problem.own_time else {}
+            t = (t - t[0]) / (time or 1.0)
+    slack = LOCATED * (b - a)
+    if not t.size or not np.all(np.diff(t) > 0) or not t[0] <= a + slack or not t[-1] >= b - slack:
+        raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
+    known = _continuous(states, periods_of(problem))
+    return Parsed(lambda at: np.stack([np.interp(at, t, column) for column in known.T], axis=1), t, None, told)
+
+
+def restated(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Parsed, dict[str, float]]:
     """Return a problem without states that follow from others, the guess for it, and the parameters.
 
-    These are states without rates, and those that follow from conserved totals.
-    """
-    guess, parameters = _over_own_time(problem, guess, parameters)
-    return _on_totals(*_with_rates(problem, guess, parameters))
-
-
-def _over_own_time(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Guess, dict[str, float]]:
-    """Return arrays (t, states) of an orbit over [0, 1], with what they say of its time and of the equilibria at its ends."""
-    if problem.own_time is None or not _is_pair(guess):
-        return guess, parameters
-    t, states = _numbers(guess[0]), _numbers(guess[1])
-    if t.size < 2 or states.size != t.size * len(problem.state_names):
-        return guess, parameters  # said of the guess as it is
-    begin, time = t[0], t[-1] - t[0]
-    found = dict(zip(problem.ends, states.reshape(t.size, -1)[[0, -1]].ravel().tolist()))
-    if abs(begin) <= LOCATED and abs(time - 1) <= LOCATED:
-        return guess, {**found, **parameters}
-    if problem.own_time:
-        found[problem.own_time] = float(time)
-    return ((t - begin) / (time or 1.0), states), {**found, **parameters}
-
-
-def _with_rates(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
-    """Return a problem without states that have no rates, and the guess for it.
+    These are states without rates, and those that follow from conserved totals, which are then among the parameters.
 
     Raises
     ------
     ProblemError
-        The states that have none are not determined at the guess.
+        A guess that does not fit; states without rates are not determined there; totals are given nowhere.
     """
-    mass, names = problem.mass, problem.state_names
-    if mass is None:
-        return problem, guess, parameters
-    if isinstance(guess, Point) and not {*guess.system.problem.states} - {*mass.kept_names(names)}:
-        known = underlying(guess)
-        return problem.without_found([known[names[i]] for i in mass.found]), guess, parameters
-    guess, first = _taken(problem, guess, lambda states: (mass.of_states(states), states.reshape(-1, len(names))[0]))
-    first = np.zeros(len(names)) if first is None else first
-    problem.check_index(first, {**problem.parameters, **parameters})
-    found = problem.without_found(first[mass.found])
-    return found, np.zeros(len(mass.kept)) if guess is None else guess, parameters
-
-
-def _on_totals(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Guess, dict[str, float]]:
-    """Return a problem without the states that follow from conserved totals, the guess, and the parameters with totals of it.
-
-    Raises
-    ------
-    ProblemError
-        The totals are neither in the guess nor among the parameters.
-    """
-    reduced = problem.reduced
-    if reduced is None:
-        return problem, guess, parameters
-    found = problem.on_totals
-    if isinstance(guess, Point) and tuple(guess.system.problem.states) == found.state_names:
-        return found, guess, parameters
-    given = all(name in parameters for name in reduced.total_names)
-    if guess is None and not given:
+    given, mass, names = parsed(problem, guess, parameters), problem.mass, problem.state_names
+    parameters, point = {**given.told, **parameters}, given.point
+    if mass is not None and point is not None and {*point.system.problem.states} <= {*mass.kept_names(names)}:
+        problem = problem.without_found([point[names[i]] for i in mass.found])
+    elif mass is not None:
+        first = given.states(given.places, len(names))[0]
+        problem.check_index(first, {**problem.parameters, **parameters})
+        problem, given = problem.without_found(first[mass.found]), given.mapped(mass.of_states, len(names))
+    if (reduced := problem.reduced) is None:
+        return problem, given, parameters
+    found, names, point = problem.on_totals, problem.state_names, given.point
+    told = all(name in parameters for name in reduced.total_names)
+    if guess is None and not told:
         raise ProblemError(f"guess: must be given, or the totals among the parameters, since {reduced.conserved}")
-    is_numbers = not (callable(guess) or isinstance(guess, Point) or _is_pair(guess))
-    if given and is_numbers and (guess is None or np.size(_numbers(guess)) == len(found.state_names)):
-        return found, guess, parameters
-    guess, totals = _taken(problem, guess, reduced.without_totals)
-    return found, guess, {**totals, **parameters}
+    if point is not None:
+        fits = tuple(point.system.problem.states) == found.state_names
+    else:
+        fits = told and given.at(given.places).shape[1] == len(found.state_names)
+    if not fits:
+        parameters = {**reduced.without_totals(given.states(given.places, len(names)))[1], **parameters}
+        given = given.mapped(lambda states: reduced.without_totals(states)[0], len(names))
+    return found, given, parameters
 
 
-def _taken(problem: Any, guess: Guess, taken: Callable[[Array], tuple[Array, Any]]) -> tuple[Guess, Any]:
-    """Return a guess with ``taken(states)[0]`` of its states (..., n), and the other value, at its first place or of all.
-
-    Without a guess both are None.
-    """
-    count = len(problem.state_names)
-    if guess is None:
-        return None, None
-    if isinstance(guess, Point):
-        guess = _of_point(guess)
-    if callable(guess):
-        whole = guess
-        first = taken(_sampled(whole, np.array(problem.domain[:1]), count))[1]
-        return (lambda t: taken(_sampled(whole, np.array([t]), count)[0])[0]), first
-    if _is_pair(guess):
-        states, value = taken(_sampled(guess, _numbers(guess[0]), count))
-        return (guess[0], states), value
-    return taken(_numbers(guess, count))
-
-
-def _of_point(point: Point) -> Guess:
-    """Return the states of a point, as a function of t where they are one."""
-    system: Any = point.system
-    if not system.is_function_of_t:
-        return system.states(point.x)[0]
-    return lambda t: system.evaluate(point.x, np.array([t * system.order]))[0]
-
-
-def first_guess(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, options: Options) -> tuple[System, Array]:
+def first_guess(
+    problem: BoundaryValueProblem | AlgebraicProblem, guess: Parsed, parameters: Mapping[str, float], free: Sequence[str],
+    intervals: int, degree: int,
+) -> tuple[System, Array]:  # fmt: skip
     """Return the discretized problem and a vector of unknowns for a guess.
 
     Raises
@@ -273,54 +292,37 @@ def first_guess(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, 
     ProblemError
         A guess that does not fit.
     """
+    values, count, point = {**problem.parameters, **parameters}, len(problem.state_names), guess.point
     if isinstance(problem, AlgebraicProblem):
-        return _without_mesh(problem, guess, options)
-    return _on_mesh(problem, guess, options)
-
-
-def _without_mesh(problem: AlgebraicProblem, guess: Guess, options: Options) -> tuple[System, Array]:
-    system = problem.discretized(options.free, options.parameters)
-    given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
-    count = len(problem.state_names)  # a map takes one point of a cycle, too
-    states = np.zeros(count) if given is None else _numbers(given)
-    if states.size != count:
-        states = _numbers(given, system.state_size)
-    return system.with_rounds_of(system.pack(states, {**problem.parameters, **options.parameters}), options.parameters)
-
-
-def _on_mesh(problem: BoundaryValueProblem, guess: Guess, options: Options) -> tuple[System, Array]:
-    guess = problem.whole_guess(guess, {**problem.parameters, **options.parameters})
-    a, b = problem.domain
-    mesh = np.linspace(a, b, options.intervals + 1)
-    order = problem.order
-    if isinstance(guess, Point):
-        mesh = _mesh_of(_meshed(guess), order)
-    elif _is_pair(guess):
-        given, slack = _numbers(guess[0]), LOCATED * (b - a)
-        if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a + slack or not given[-1] >= b - slack:
-            raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
-    system = problem.discretized(options.free, options.parameters, None, mesh, options.degree)
-    if not isinstance(guess, Point):
+        algebraic = problem.discretized(free, parameters)
+        states = guess.at(guess.places).ravel() if point is None else point.x[: point.system.state_size]
+        if states.size not in (count, algebraic.state_size):  # a map takes one point of a cycle, too
+            raise ProblemError(f"guess: {states.size} numbers, must be the {algebraic.state_size} states")
+        return algebraic.with_rounds_of(algebraic.pack(states, values), parameters)
+    mesh = np.linspace(*problem.domain, intervals + 1)
+    if point is not None:
+        mesh = _mesh_of(over_t(point, "guess: a Point must be a solution of a boundary value problem"), problem.order)
+    system = problem.discretized(free, parameters, None, mesh, degree)
+    if point is None:
         system = system.on_breaks()
-    if problem.dimension < len(problem.state_names) and not isinstance(guess, Point):
-        return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
-    periods = periods_of(problem)
-    states = _sampled(guess, system.nodes / order, len(problem.state_names), periods)
-    if periods.any():
-        system, states = _with_rounds(system, states, options)
-    x = system.pack(states, {**problem.parameters, **options.parameters})
+        if problem.dimension < count:
+            return system, with_guessed_multipliers(system, guess.states(system.nodes, problem.dimension))
+    states = guess.states(system.nodes / problem.order, count)
+    if periods_of(problem).any():
+        system, states = _with_rounds(system, states.copy(), parameters)
+    x = system.pack(states, values)
     return system.with_reference(x), x
 
 
-def _continuous(states: Array, periods: Array | None) -> Array:
+def _continuous(states: Array, periods: Array) -> Array:
     """Return states (K, n) whose angles do not jump by whole rounds from one to the next, as values between -pi and pi do."""
-    if periods is None or not periods.any():
+    if not periods.any():
         return states
     jumps = whole_rounds(np.diff(states, axis=0), periods)
     return states - np.concatenate([np.zeros((1, states.shape[1])), np.cumsum(jumps, axis=0)])
 
 
-def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[Collocation, Array]:
+def _with_rounds(system: Collocation, states: Array, parameters: Mapping[str, float]) -> tuple[Collocation, Array]:
     """Return an orbit with the winding numbers of a guess, unless they are given, and its states.
 
     Of angles that are given to rotate, and do not, those rounds are added, uniformly.
@@ -328,37 +330,13 @@ def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[
     problem: Any = system.problem
     periods, symmetry = periods_of(problem), getattr(problem, "symmetry", np.eye(len(problem.states)))
     read = windings(problem.angles, problem.state_names, states[-1] - symmetry @ states[0])
-    given = {name: value for name, value in options.parameters.items() if name in read}
+    given = {name: value for name, value in parameters.items() if name in read}
     for name, value in given.items():
         if not read[name]:
             place = problem.state_names.index(name.removeprefix(WINDING))
             states[:, place] += system.nodes * value * periods[place]
     found: Collocation = system.with_parameters({**read, **given})
     return found, states
-
-
-def _sampled(guess: Guess, nodes: Array, count: int, periods: Array | None = None) -> Array:
-    """Return the states of a guess at the nodes, shape (K, count); angles, of these periods, are made continuous."""
-    if isinstance(guess, Point):
-        states = _meshed(guess).evaluate(guess.x, nodes * guess.system.order)
-        if states.shape[1] != count:
-            raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
-        return states
-    if callable(guess):
-        try:
-            values = [guess(t) for t in nodes]
-        except Exception as error:  # a user's function may raise anything
-            raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
-        return _continuous(np.array([_numbers(value, count) for value in values]), periods)
-    if _is_pair(guess):
-        t, columns = _numbers(guess[0]), _numbers(guess[1])
-        if columns.size != len(t) * count:
-            raise ProblemError(f"guess: {columns.size} numbers for {len(t)} places t and {count} states")
-        known = _continuous(columns.reshape(len(t), count), periods)
-        return np.stack([np.interp(nodes, t, column) for column in known.T], axis=1)
-    if guess is None:
-        raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
-    return np.tile(_numbers(guess, count), (len(nodes), 1))
 
 
 def _numbers(values: object, count: int | None = None) -> Array:
@@ -372,11 +350,6 @@ def _numbers(values: object, count: int | None = None) -> Array:
     return array if count is None else array.ravel()
 
 
-def _meshed(guess: Point) -> Collocation:
-    """Return the system of a guess that is a solution of a boundary value problem."""
-    return over_t(guess, "guess: a Point must be a solution of a boundary value problem")
-
-
 def _mesh_of(system: Collocation, order: int) -> Array:
     """Return the mesh of a guess for a problem with a symmetry of this order, on the part that is computed."""
     parts = system.order
@@ -384,8 +357,3 @@ def _mesh_of(system: Collocation, order: int) -> Array:
         return system.mesh
     whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts
     return np.append(whole[whole < 1 - ROUGH], 1.0)
-
-
-def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:
-    """Return whether a guess is (t, states)."""
-    return isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray))

@@ -454,7 +454,7 @@ def cycle(
     """
     checks.number("settle", settle, 0)
     found = restated(problem, _numbers(start, len(problem.state_names)), dict(parameters or {}))
-    problem, first, values = found[0], np.asarray(found[1]), found[2]
+    problem, first, values = found[0], found[1].at(found[1].places)[0], found[2]
     values = {**problem.parameters, **values}
     field = _vector_field(problem, values)
     if problem.period is None:

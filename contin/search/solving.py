@@ -29,10 +29,10 @@ from contin.levels import APART, MOST_STEPS
 from contin.linalg.orientation import first_least
 from contin.problems.angles import winding_names
 from contin.problems.statement import declared, forget_changed, with_multipliers
-from contin.results.point import Point, point_of, underlying
+from contin.results.point import Point, point_of
 from contin.results.record import system_of
 from contin.search.failure import dependence, doubtful, label_of, looked_at, not_finite_near, of_family, recovered
-from contin.search.guess import Guess, Options, first_guess, restated
+from contin.search.guess import Guess, first_guess, restated
 from contin.text import exact_text
 
 #: Where a deflated iteration starts, as multiples of the guess's distance from the nearest known solution, and its longest
@@ -133,15 +133,21 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
     forget_changed(problem)
-    problem, guess, parameters = restated(problem, guess, _checked(parameters))
+    problem, start, parameters = restated(problem, guess, _checked(parameters))
     _check_others(problem, others)
     free = with_multipliers(problem, free)
-    if isinstance(guess, Point):
-        guess = underlying(guess)
+    if start.point is not None:
         read = winding_names(problem.angles)  # off the guess, as of all others
-        parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
+        known = {name: value for name, value in start.point.parameters.items() if name not in read}
+        parameters = {**known, **parameters}
     held = _check_count(problem, free)
-    system, x = first_guess(problem, guess, Options(parameters, free, intervals, _degree(problem, guess, control, degree)))
+    if degree is not None:
+        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
+    elif start.point is not None and start.point.system.is_function_of_t:
+        degree = start.point.system.degree
+    else:
+        degree = problem.usual_degree(control.tolerance)
+    system, x = first_guess(problem, start, parameters, free, intervals, degree)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return solved(*_sized(system, x), control, newton, others, held, explains=True)
@@ -156,18 +162,6 @@ def _sized(system: System, x: Array) -> tuple[System, Array]:
     sizes = {name: max(size, known.get(name, 0.0)) for name, size in stated.items()}
     both = ([sizes.get(name, 1.0) for name in names] for names in (problem.states, problem.parameters))
     return system.with_scales(x, *(usual(np.array(one), True) for one in both))
-
-
-def _degree(
-    problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl, given: int | None
-) -> int:  # fmt: skip
-    """Return the degree that is given; without one that of the guess, or the usual one."""
-    if given is not None:
-        checks.whole("degree", given, DEGREES[0], DEGREES[-1])
-        return given
-    if isinstance(guess, Point) and guess.system.is_function_of_t:
-        return guess.system.degree
-    return problem.usual_degree(control.tolerance)
 
 
 def solved(
