@@ -41,9 +41,11 @@ def main(argv=None) -> int:
         sys.stdout.write(help_text())
         return 0
     if words[:1] == ["--version"]:
+        import platform
         from importlib.metadata import version
 
-        sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')}\n")
+        parts = (f"Python {platform.python_version()}", f"numpy {version('numpy')}", platform.platform())
+        sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')} ({', '.join(parts)})\n")
         return 0
     if words[:1] == ["completion"]:
         return _complete(words[1:])

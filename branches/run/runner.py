@@ -6,10 +6,12 @@ the file keeps the state of its stage, and the labelled points of the stages bef
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import dataclasses
 import signal
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +25,7 @@ from branches.scene.labels import START
 from branches.scene.parse import difference, parse
 from branches.scene.stage import Stage
 from branches.scene.stages import stages_of
+from branches.store import interrupt
 from branches.store.files import StoreError, only_run, prepare
 from branches.store.writer import BranchWriter, open_branch, read_kept, read_state
 from contin import Point, Reason
@@ -195,6 +198,7 @@ def _through(stage: Stage, run: Continuation, writer: BranchWriter, labelled: li
         if interruption.asked or writer.due():
             writer.note(stage.notes(run))
             writer.checkpoint(run.start, "interrupted" if interruption.asked else "running")
+            interrupt.change(f"{writer.path} keeps the points of its last checkpoint; go on with --resume")
             if interruption.asked:
                 return False
     writer.flush()
@@ -283,13 +287,20 @@ def _look_at(path: Path, scene: Scene, resume: bool, overwrite: bool) -> str | N
 
 
 class Interruption:
-    """Stop the run after the current point on Ctrl-C, SIGTERM or a closed terminal; on the second signal, at once."""
+    """Stop the run after the current point on Ctrl-C, SIGTERM or a closed terminal; on the second signal, at once.
 
+    SIGTERM is its own second signal after `GRACE` seconds: whoever sends it kills what does not end soon.
+    """
+
+    #: Seconds. A point of a large network takes longer; the last checkpoint has the points up to half a second before.
+    GRACE = 0.7
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
     def __init__(self, signals=_SIGNALS):
         self.asked, self._signals = False, signals
         self._before = {}
+        self._end = threading.Timer(self.GRACE, _thread.interrupt_main, [signal.SIGTERM])
+        self._end.daemon = True
 
     def __enter__(self):
         for number in self._signals:
@@ -305,7 +316,10 @@ class Interruption:
         if self.asked:
             raise KeyboardInterrupt
         self.asked = True
+        if number == signal.SIGTERM:
+            self._end.start()
 
     def __exit__(self, *exception):
+        self._end.cancel()
         for number, handler in self._before.items():
             signal.signal(number, handler)

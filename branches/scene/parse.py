@@ -262,14 +262,14 @@ def scenes() -> list[Path]:
 
 
 def found(name: str) -> str:
-    """Return the file of a scene: the given one, or, where there is none, the scene of the package with this name.
+    """Return the file of a scene: the given one, or, where there is none (a folder is none), that of the package of this name.
 
     Examples
     --------
     >>> Path(found("m1_n2")).name, found("no such scene")
     ('m1_n2.yaml', 'no such scene')
     """
-    return name if Path(name).exists() else next((str(file) for file in scenes() if file.stem == name), name)
+    return name if Path(name).is_file() else next((str(file) for file in scenes() if file.stem == name), name)
 
 
 # --- YAML -------------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ import contextlib
 import importlib.util
 import io
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import sys
 import pytest
 
 from branches import cli
+from branches.scene.parse import found
 
 PROGRAM = ("-m", "branches.cli")
 
@@ -126,8 +128,20 @@ def test_scenes_of_the_package_are_listed_and_run_by_name(command, call, root, m
     unknown = command("run", "m1_n22", program=PROGRAM).err
     assert unknown.endswith(" (did you mean 'm1_n2'?); 'ribbon scenes' lists those of the package\n")
     assert [line.split()[0] for line in listed.splitlines()] == sorted(file.stem for file in (root / "configs").glob("*.yaml"))
+    (command.folder / "m1_n2").mkdir()  # as a diagram leaves it: the name still means the scene
     done = command("run", "m1_n2", "--quiet", "--set", "steps.max_points=3", program=PROGRAM)
     assert done.returncode == 0 and (command.folder / "m1_n2.h5").exists()
+
+
+def test_a_folder_of_results_does_not_hide_a_scene_of_its_name(tmp_path, monkeypatch, root):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fig12").mkdir()
+    assert found("fig12") == str(root / "configs" / "fig12.yaml") and found("fig12/") == "fig12/"
+
+
+def test_version_tells_what_a_report_of_a_fault_needs(call):
+    told = call(cli.main, "--version").out
+    assert all(word in told for word in ("ribbon-continuation ", "Python ", "numpy ", platform.system()))
 
 
 def test_it_is_installed_as_ribbon(root):

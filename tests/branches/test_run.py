@@ -14,7 +14,7 @@ import pytest
 
 from branches.run.__main__ import main
 from branches.run.display import Display
-from branches.run.runner import run_scene
+from branches.run.runner import Interruption, run_scene
 from branches.scene.closed import ClosedScene
 from branches.scene.fields import ConfigError
 from branches.scene.parse import load
@@ -310,6 +310,20 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
     with pytest.raises(KeyboardInterrupt):
         run_scene(scene_of(), path, silent({5: twice}))
     assert path.read_bytes() == before and os.listdir(tmp_path) == ["x.h5"]
+
+
+@pytest.mark.posix("signals")
+def test_sigterm_ends_a_point_that_takes_long(monkeypatch):
+    monkeypatch.setattr(Interruption, "GRACE", 0.05)
+    with pytest.raises(KeyboardInterrupt), Interruption() as interruption:
+        signal.raise_signal(signal.SIGTERM)
+        assert interruption.asked
+        until = time.monotonic() + 5
+        while time.monotonic() < until:
+            pass
+    with Interruption():
+        signal.raise_signal(signal.SIGTERM)
+    time.sleep(0.1)  # it ended in time: nothing comes afterwards
 
 
 @pytest.mark.posix("signals")
