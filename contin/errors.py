@@ -17,7 +17,7 @@ from typing import Any, ParamSpec, TypeGuard, TypeVar, cast
 import numpy as np
 
 from contin.arrays import Array
-from contin.text import ROWS, exact_text
+from contin.text import ROWS, exact_text, meant
 
 #: Names of modules of the package begin with this.
 _PACKAGE = __name__.partition(".")[0] + "."
@@ -172,7 +172,8 @@ def chosen(what: str, value: object, known: Sequence[str]) -> tuple[str, ...]:
     found = names(what, value)
     for name in found:
         if name not in known:
-            raise ProblemError(f"{what}: {shown(name)} must be one of {listed(known) or 'none, as there are none here'}")
+            near = meant(name, known)
+            raise ProblemError(f"{what}: {shown(name)} must be one of {listed(known) or 'none, as there are none here'}{near}")
         if found.count(name) > 1:
             raise ProblemError(f"{what}: {plain(name)} is given twice")
     return found

@@ -14,7 +14,7 @@ from contin.core.newton import Newton
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
 from contin.errors import ProblemError, warn
-from contin.text import exact_text
+from contin.text import exact_text, meant
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def check(system: Discretization, settings: Settings) -> None:
     trivial = () if settings.trivial is None else (settings.trivial,)
     for name in (*settings.limits, *settings.zeros, *settings.extrema, *trivial):
         if name not in known:
-            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)}){meant(name, known)}")
 
 
 class Options(TypedDict, total=False):
@@ -203,7 +203,7 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
     options = _by_new_name(options)
     for name in options:
         if name not in known:
-            raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
+            raise ProblemError(f"there is no setting {name!r}{meant(name, known)}; known are {', '.join(known)}")
     settings = settings or Settings()
     if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
         options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}

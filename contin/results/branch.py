@@ -14,10 +14,11 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.core.labels import Label
 from contin.core.step import Stop
+from contin.errors import warn
 from contin.results import plot
 from contin.results.marks import Axes, html_table
 from contin.results.point import Point
-from contin.text import ROWS
+from contin.text import ROWS, meant
 
 
 @dataclass
@@ -106,6 +107,9 @@ class Branch:
         (1, 0)
         """
         found = [point for point in self.points if point.label == label]
+        if not found and label not in (known := [each.value for each in Label if each]):
+            known_labels = ", ".join(known)
+            warn(f"labelled: no point has the label {label!r}{meant(label, known)}; contin's are {known_labels}", UserWarning)
         return found if label == Label.END else [point for point in found if point.arclength]
 
     def to_pandas(self) -> Any:

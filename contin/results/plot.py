@@ -22,7 +22,7 @@ from contin.errors import ProblemError
 from contin.events.labelled import finding_of
 from contin.results.marks import Axes, Colour, heading, mark_of, new_axes
 from contin.results.point import Point
-from contin.text import COLUMNS
+from contin.text import COLUMNS, meant
 
 #: Straight pieces in which a cubic is drawn. Tangents turn by about 20 degrees in a step at most, so the corners of the polygon
 #: turn by one or two; with a quarter as many, corners are seen.
@@ -346,4 +346,6 @@ def check_column(points: Sequence[Point], argument: str, name: str, further: Seq
     first = points[0]
     known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *first.system.named_states]
     if name not in known:
-        raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join((*known, *further))}")
+        raise ProblemError(
+            f"{argument}: {checks.shown(name)} is no column{meant(name, known)}; there are {', '.join((*known, *further))}"
+        )

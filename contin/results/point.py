@@ -22,7 +22,7 @@ from contin.problems.statement import PERIOD
 from contin.results.marks import Axes, point_to_html
 from contin.results.record import Profile, Record
 from contin.results.sensitivity import sensitivities
-from contin.text import COLUMNS
+from contin.text import COLUMNS, meant
 
 if TYPE_CHECKING:
     from contin.cycles.floquet import Floquet
@@ -117,7 +117,8 @@ class Point(Record):
         functions = () if states else tuple(self.system.problem.states)
         if name in functions:
             raise KeyError(f"{name!r} is a function of t: take point.system.evaluate(point.x, t), or state a functional of it")
-        raise KeyError(f"{name!r} is none of {checks.listed((*self.parameters, *self.functionals, *states))}")
+        known = (*self.parameters, *self.functionals, *states)
+        raise KeyError(f"{name!r} is none of {checks.listed(known)}{meant(name, known)}")
 
     def __repr__(self) -> str:
         columns = {**self.parameters, **self.functionals}

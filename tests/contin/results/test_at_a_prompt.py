@@ -57,6 +57,13 @@ def test_a_name_that_is_not_there_is_answered_with_those_that_are():
         solve(AlgebraicProblem(lambda u, p: (u.typo - p.a,), ["x"], {"a": 1.0}), [0.0])
 
 
+def test_a_label_that_nothing_has_is_told():
+    branch = trace(solve(PROBLEM, [0, 0]), free=["lam"], limits={"lam": (0, 1)})
+    with pytest.warns(UserWarning, match=r"no point has the label 'L' \(did you mean 'LP'\?\)"):
+        assert branch.labelled("L") == []
+    assert branch.labelled("HB") == []  # it may have one: nothing to tell
+
+
 def test_missing_conditions_are_counted():
     problem = BoundaryValueProblem(bratu, lambda a, b, p: (a.u,), ["u", "v"], {"lam": 0.0})
     with pytest.raises(ProblemError, match="1 boundary and integral conditions for 2 states; 1 more needed"):
