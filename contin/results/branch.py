@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
-import numpy as np
-
 from contin import errors as checks
 from contin.arrays import Array
 from contin.core.labels import Label
@@ -80,7 +78,16 @@ class Branch:
 
     @checks.arguments
     def column(self, name: str) -> Array:
-        """Return a parameter or functional over all points.
+        """Return a parameter, a functional, or another column over all points.
+
+        The others are ``"arclength"``, ``"discretization_error"``, ``"norm"``, and the states of equilibria. A state ``x`` of
+        equilibria is ``max_x`` and ``min_x``, too, which cycles have: both go into one picture. The norm is the root of the
+        mean of |u|^2 over t, for cycles the time; of equilibria it is |u|.
+
+        Raises
+        ------
+        KeyError
+            There is no such column.
 
         Examples
         --------
@@ -90,7 +97,7 @@ class Branch:
         >>> branch.column("a")[[0, -1]].round(10).tolist()
         [1.0, 4.0]
         """
-        return np.array([point[name] for point in self.points])
+        return plot.column(self.points, name)
 
     @checks.arguments
     def labelled(self, label: str) -> list[Point]:
@@ -164,7 +171,10 @@ class Branch:
         return plot.curve(self.points, names)
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:
+    def plot(
+        self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False,
+        color: str | None = None,
+    ) -> Any:  # fmt: skip
         """Draw one column against another as a smooth curve, with dots at the points and marks at labelled ones.
 
         The curve has the tangents of the branch (`curve`). In a window, or a notebook whose pictures are live (``%matplotlib
@@ -176,14 +186,15 @@ class Branch:
         Parameters
         ----------
         x, y : str, optional
-            A parameter, a functional, ``"arclength"`` or ``"norm"`` (root mean square of the states over the nodes). By default
-            the first free parameter, and the first functional; where there is none, the first state of algebraic problems,
-            and ``"norm"`` of others. Of cycles ``y`` may be a state: its largest and its smallest value are drawn; by default
-            those of the first one.
+            As of `column`. By default the first free parameter, and the first functional; where there is none, the first state
+            of algebraic problems, and ``"norm"`` of others. Of cycles ``y`` may be a state: its largest and its smallest value
+            are drawn; by default those of the first one.
         axes : matplotlib.axes.Axes, optional
             Where to draw; a figure of its own without.
         errors : bool
             Draw the estimated errors of both columns as bars. Most are shorter than a dot.
+        color : str, optional
+            Of the line and its dots, as matplotlib takes it; by default blue, and green of cycles.
 
         Returns
         -------
@@ -204,7 +215,7 @@ class Branch:
         >>> branch.plot("a", "x").get_ylabel()
         'x'
         """
-        return plot.plot(self.points, x, y, axes, errors)
+        return plot.plot(self.points, x, y, axes, errors, color)
 
     def _repr_html_(self) -> str:
         return to_html(self.points, self.stop, self.notes)

@@ -16,7 +16,6 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.core.differences import derivative
 from contin.core.labels import Label
-from contin.core.protocol import Discretization
 from contin.core.trial import Trial
 from contin.errors import ProblemError
 from contin.events.labelled import finding_of
@@ -74,21 +73,38 @@ def through(s: Array, values: Array, rates: Array, parts: int = PARTS) -> Array:
 _SHRUNK = (Label.HOPF, Label.PERIOD_DOUBLING)
 
 
-def column(points: Sequence[Point], name: str) -> Array:
-    """Return a parameter, functional, state of equilibria, ``"arclength"``, ``"norm"`` or ``"discretization_error"``.
+#: Columns that every branch has.
+_OF_ALL = ("arclength", "norm", "discretization_error")
 
-    The norm is the root mean square of the states over the nodes.
-    """
-    if points and name in (*points[0].parameters, *points[0].functionals, *points[0].system.named_states):
-        return np.array([point[name] for point in points])
+
+def column(points: Sequence[Point], name: str) -> Array:
+    """Return a column of `contin.Branch.column` over all points."""
     if name in ("arclength", "discretization_error"):
         return np.array([getattr(point, name) for point in points])
-    return np.array([norm(point.system, point.x) for point in points])
+    return np.array([value(point, name) for point in points])
 
 
-def norm(system: Discretization, x: Array) -> float:
-    """Return the root mean square of the states over the nodes."""
-    return float(np.sqrt(np.mean(np.sum(system.states(x) ** 2, axis=1))))
+def value(point: Point | Trial, name: str) -> float:
+    """Return a parameter, a functional, a state of equilibria, its largest or smallest value, or the norm.
+
+    Raises
+    ------
+    KeyError
+        There is none of this name.
+    """
+    system = point.system
+    states, extreme = system.named_states, name[:3]
+    if name in (*system.problem.parameters, *system.problem.functionals, *states) or name not in ("norm", *_extremes(states)):
+        return point[name]
+    found = system.states(point.x)
+    if name != "norm":
+        return float(getattr(np, extreme)(found[:, states.index(name[4:])]))
+    return float(np.sqrt(system.weights[: found.size] @ np.square(found).ravel()))
+
+
+def _extremes(states: Sequence[str]) -> list[str]:
+    """Return the columns of the largest and smallest values of states."""
+    return [f"{extreme}_{state}" for state in states for extreme in ("max", "min")]
 
 
 def curve(points: Sequence[Point], names: Sequence[str], parts: int = PARTS) -> Array:
@@ -113,20 +129,12 @@ def _rates(point: Point, names: Sequence[str]) -> Array:
 
     def values(distance: float) -> Array:
         trial = Trial.without_tangent(point.system, point.x + distance * tangent)
-        return np.array([_value(trial, names[i]) for i in moving])
+        return np.array([value(trial, names[i]) for i in moving])
 
     if moving:
         found[moving] = derivative(values)[0]
     found[[i for i, name in enumerate(names) if name == "arclength"]] = 1.0
     return found
-
-
-def _value(trial: Trial, name: str) -> float:
-    """Return a column at a point that has not been made a record; see `column`."""
-    system = trial.system
-    if name in (*system.problem.parameters, *system.problem.functionals, *system.named_states):
-        return trial[name]
-    return norm(system, trial.x)
 
 
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
@@ -139,7 +147,7 @@ _LINES: dict[bool | None, tuple[Any, str]] = {
 }
 #: Words of axes for columns that every branch has.
 _WORDS = {
-    "norm": "norm (rms of the states)", "arclength": "arclength of the branch",
+    "norm": "norm (root mean square over t)", "arclength": "arclength of the branch",
     "discretization_error": "discretization error, relative to 1 + size",
 }  # fmt: skip
 #: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.
@@ -153,15 +161,21 @@ _NEAR = 5
 
 
 def plot(
-    points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False
-) -> Any:
+    points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False,
+    color: str | None = None,
+) -> Any:  # fmt: skip
     """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
+    from matplotlib.colors import is_color_like
+
+    if color is not None and not is_color_like(color):
+        raise ProblemError(f"color: {checks.shown(color)} must be one of matplotlib's, such as 'red' or '#0072B2'")
     pieces = list(_pieces(points))
     named: set[str | None] = set(axes.get_legend_handles_labels()[1])
+    color = color or (Colour.GREEN if points[0].system.is_cycle else Colour.BLUE)
     for column_name in columns:
-        named |= _draw(points, (x, column_name), pieces, named, axes)
+        named |= _draw(points, (x, column_name), pieces, named, (axes, color))
         if errors:
             _bars(points, (x, column_name), axes)
     axes.set(xlabel=_WORDS.get(x, x), ylabel=_WORDS.get(name, name))
@@ -172,25 +186,27 @@ def plot(
 
 def _draw(
     points: Sequence[Point], names: tuple[str, str], pieces: Sequence[tuple[bool | None, slice]], known: set[str | None],
-    axes: Axes,
+    drawing: tuple[Axes, Any],
 ) -> set[str | None]:  # fmt: skip
     """Draw one column over another, and return the names for the legend; those that are ``known`` are not given again."""
     (across, up), (x, y) = (column(points, name) for name in names), curve(points, names)
     named: set[str | None] = set()
+    axes, color = drawing
+    kind = " cycles" * points[0].system.is_cycle
 
     def once(word: str | None) -> str | None:
-        label = None if word in known | named else word
+        label = None if word in known | named else word or None
         named.add(word)
         return label
 
     filled = [True] * len(points)
     for stable, piece in pieces:
         filled[piece] = [stable is not False] * len(points[piece])
-        dashes, word = _LINES[stable] if len(pieces) > 1 or stable is not None else ("-", None)
+        dashes, word = _LINES[stable] if len(pieces) > 1 or stable is not None else ("-", "")
         fine = slice(piece.start * PARTS, (piece.stop - 1) * PARTS + 1)
-        axes.plot(x[fine], y[fine], lw=1.5, color=Colour.BLUE, ls=dashes, label=once(word), zorder=1)
-    style: dict[str, Any] = {"s": _DOT, "edgecolors": Colour.BLUE, "linewidths": 0.8, "zorder": 1.5}
-    fill = [Colour.BLUE if full else "white" for full in filled]
+        axes.plot(x[fine], y[fine], lw=1.5, color=color, ls=dashes, label=once(word and word + kind), zorder=1)
+    style: dict[str, Any] = {"s": _DOT, "edgecolors": color, "linewidths": 0.8, "zorder": 1.5}
+    fill = [color if full else "white" for full in filled]
     _tell(axes, axes.scatter(across, up, c=fill, picker=True, pickradius=_NEAR, **style), points)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
@@ -344,8 +360,8 @@ def check_column(points: Sequence[Point], argument: str, name: str, further: Seq
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *first.system.named_states]
-    if name not in known:
+    known = [*first.parameters, *first.functionals, *_OF_ALL, *first.system.named_states]
+    if name not in (*known, *_extremes(first.system.named_states)):
         raise ProblemError(
             f"{argument}: {checks.shown(name)} is no column{meant(name, known)}; there are {', '.join((*known, *further))}"
         )

@@ -83,7 +83,10 @@ class Diagram:
         return [*(f"  {each!r}" for each in self.searches[:ROWS]), *more, *caution]
 
     @checks.arguments
-    def plot(self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False) -> Any:
+    def plot(
+        self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False,
+        color: str | Sequence[str] | None = None,
+    ) -> Any:  # fmt: skip
         """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
 
         Parameters
@@ -94,6 +97,8 @@ class Diagram:
             Where to draw; a figure of its own without.
         errors : bool
             As in `contin.Branch.plot`.
+        color : str or sequence of str, optional
+            As in `contin.Branch.plot`, of all branches, or one for each.
 
         Returns
         -------
@@ -107,12 +112,15 @@ class Diagram:
         >>> found.plot("a", "x").get_xlabel()
         'a'
         """
-        drawn = [branch.points for branch in self.branches if branch.points]
-        cycles = [points[0].system for points in drawn if points[0].system.is_cycle and points[0].system.intervals]
+        colors = [color] * len(self.branches) if color is None or isinstance(color, str) else list(color)
+        if len(colors) != len(self.branches):
+            raise ProblemError(f"color: {len(colors)} given, must be one for each of the {len(self.branches)} branches")
+        drawn = [(branch.points, each) for branch, each in zip(self.branches, colors) if branch.points]
+        cycles = [points[0].system for points, _ in drawn if points[0].system.is_cycle and points[0].system.intervals]
         if cycles and y is None:
             y = cycles[0].problem.states[0]
-        for points in drawn:
-            axes = plot.plot(points, x, y, axes, errors)
+        for points, each in drawn:
+            axes = plot.plot(points, x, y, axes, errors, each)
         return axes
 
     def _repr_html_(self) -> str:

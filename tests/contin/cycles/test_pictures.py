@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -35,7 +36,7 @@ def test_largest_and_smallest_values_with_their_stability(branch):
     for upper, lower, name in ((top, inner_top, "max_x"), (bottom, inner_bottom, "min_x")):
         assert set(branch.column(name)) <= {*upper.get_ydata(), *lower.get_ydata()}
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert words == ["stable", "unstable", "end (EP)", "fold (LP)"]
+    assert words == ["stable cycles", "unstable cycles", "end (EP)", "fold (LP)"]
     assert len(branch.plot(axes=axes).get_legend().get_texts()) == 4  # a second branch in the figure has the same legend
 
 
@@ -56,13 +57,33 @@ def test_a_diagram():
     axes = found.plot(axes=Figure().subplots())
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("b", "x, largest and smallest")
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [
-        "stable", "unstable", "end (EP)", "Hopf point (HB)",
+        "stable", "unstable", "end (EP)", "Hopf point (HB)", "stable cycles",
     ]  # fmt: skip
     before, behind, top, bottom = axes.lines[:2] + axes.lines[-2:]
     assert [line.get_linestyle() for line in (before, behind, top, bottom)] == ["-", "--", "-", "-"]
     assert before.get_ydata() == pytest.approx(1.0) and before.get_xdata()[-1] == pytest.approx(2.0)
     assert top.get_xdata()[0] == pytest.approx(2.0) and top.get_ydata()[-1] > 3 > 1 > bottom.get_ydata()[-1]
+    assert before.get_color() != top.get_color()
     assert found.plot(y="y", axes=Figure().subplots()).get_ylabel() == "y, largest and smallest"
+    equilibria, cycles = found.branches[0], found.branches[-1]
+    for branch in (equilibria, cycles):  # a column of both: one picture
+        assert branch.plot("b", "max_x", axes=Figure().subplots()).get_ylabel() == "max_x"
+    assert (equilibria["max_x"] == equilibria["x"]).all() and cycles["max_x"][-1] > 3
+    own = found.plot(axes=Figure().subplots(), color=["red"] * len(found.branches))
+    assert {line.get_color() for line in own.lines} == {"red"}
+    with pytest.raises(ProblemError, match="color: 1 given, must be one for each of the"):
+        found.plot(color=["red"])
+
+
+def test_the_norm_is_the_mean_over_time_on_any_mesh():
+    """Of van der Pol's relaxation oscillations: by the trapezoidal rule. Nodes are dense where they are fast."""
+    field = CycleProblem(lambda u, p: (u.y, p.mu * (1 - u.x**2) * u.y - u.x), ["x", "y"], {"mu": 1.0})
+    orbit = contin.solve(field, lambda t: (2 * math.cos(6.283 * t), -2 * math.sin(6.283 * t)), {"period": 6.6})
+    point = contin.trace(orbit, free=["mu"], limits={"mu": (0, 8)}).points[-1]
+    states = point.system.evaluate(point.x, np.linspace(0, 1, 20001))
+    known = math.sqrt(np.mean(np.sum(states[1:] ** 2, axis=1)))
+    assert contin.Branch([point])["norm"][0] == pytest.approx(known, rel=1e-6)
+    assert math.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) > 1.1 * known
 
 
 def test_one_cycle(branch):

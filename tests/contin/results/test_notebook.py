@@ -32,8 +32,9 @@ def test_table_has_every_point(branch):
 
 def test_norm_is_the_root_mean_square_of_the_states(branch):
     point = branch.points[3]
-    states = point.system.states(point.x)
-    assert branch.to_pandas().norm[3] == pytest.approx(math.sqrt((states[:, 0] ** 2 + states[:, 1] ** 2).mean()))
+    t = np.linspace(0, 1, 2001)
+    states = point.system.evaluate(point.x, t)
+    assert branch.to_pandas().norm[3] == pytest.approx(math.sqrt(np.trapezoid((states**2).sum(axis=1), t)), rel=1e-6)
 
 
 @pytest.mark.full
@@ -66,7 +67,7 @@ def test_plot(branch):
     words = {text.get_text() for text in axes.get_legend().get_texts()}
     assert words == {"end (EP)", "given value (UZ)", "fold (LP)"}
     axes = branch.plot("arclength", "norm", axes=Figure().subplots())
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength of the branch", "norm (rms of the states)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("arclength of the branch", "norm (root mean square over t)")
 
 
 def test_curves_have_the_tangents_of_the_branch(branch):
@@ -180,7 +181,7 @@ def test_a_problem_without_functionals_is_drawn_by_its_first_state_or_its_norm()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", branch[0].system.named_states[0])
     plain = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
     axes = contin.trace(contin.solve(plain, [0, 0]), free=["q"], limits={"q": (8, 9)}, progress=False).plot()
-    assert axes.get_ylabel() == "norm (rms of the states)"
+    assert axes.get_ylabel() == "norm (root mean square over t)"
 
 
 def test_contin_alone_imports_neither_library():
