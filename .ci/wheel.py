@@ -22,7 +22,7 @@ from email.parser import Parser
 from pathlib import Path
 
 import contin
-from contin.functions import kernel, machine_code
+from contin.kernels import kernel, machine_code
 
 #: What only the compiler needs.
 COMPILER = {"numba"}
@@ -80,7 +80,7 @@ def filled(wheel: Path, made: list[Path]) -> None:
         run("unpack", "--dest", folder, str(wheel))
         (content,) = Path(folder).iterdir()
         for library in made:
-            shutil.copy(library, content / "contin" / "functions")
+            shutil.copy(library, content / "contin" / "kernels")
         (about,) = content.glob("*.dist-info")
         metadata = (about / "METADATA").read_text(encoding="utf-8")
         for needed in Parser().parsestr(metadata).get_all("Requires-Dist", []):

@@ -15,7 +15,7 @@ from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.iteration import gradient, least, minimum, root
-from .functions.machine_code import cache_directory
+from .kernels.machine_code import cache_directory
 from .linalg.orientation import eigenbasis
 from .results.marks import PALETTE, Colour
 from .results.phase_response import PhaseResponse

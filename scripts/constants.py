@@ -21,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Rooms whose constants do not decide what a run does: they are sizes of tables and of vectors.
-OTHERS = ("functions", "linalg", "problems", "results")
+OTHERS = ("functions", "kernels", "linalg", "problems", "results")
 #: Runs of the bank that take longer than the others together.
 SLOW = ("kar", "bru", "spb")
 

@@ -33,7 +33,8 @@ PURPOSE = {
     "collocation": "nodes, mesh, assembly, error of a solution: arrays and kernels",
     "problems": "what all statements share",
     "linalg": "factorization by condensation, dense LU, singular vectors",
-    "functions": "users' functions recorded: exact derivatives, interpreter; kernels",
+    "functions": "users' functions recorded: exact derivatives, interpreter",
+    "kernels": "Python functions as machine code",
     FOUNDATION: "what every room uses (arrows left out)",
 }
 #: Packages that are named in the box of a room that imports them.

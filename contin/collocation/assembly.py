@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
 from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.elimination import Range
 from contin.linalg.vector import address, scale_into

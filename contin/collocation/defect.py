@@ -32,8 +32,8 @@ from contin.collocation.corners import Switching
 from contin.collocation.mesh import basis, interpolation, near
 from contin.collocation.newton import Codes, Values, Workspace, put_free
 from contin.functions.interpreter import Loaded, Points, run_loaded
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.levels import LOCATED
 from contin.linalg.condensation import Factored, solve
 from contin.text import shown

@@ -15,8 +15,8 @@ from contin.arrays import Array
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate
 from contin.collocation.projection import Projections, fill_projections
 from contin.functions.interpreter import Loaded, Points, run_loaded
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg import convergence
 from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.condensation import Factored, solve

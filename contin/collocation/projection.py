@@ -21,8 +21,8 @@ import numpy as np
 
 from contin.arrays import Array, Indices
 from contin.functions.interpreter import Loaded, Points, run_loaded
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import MOST_UPDATES
 from contin.linalg.small import factor_small, fill_eigenvalues, solve_small
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.collocation.mesh import basis, interpolation
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, ReadOnlyVector, Stack, Vector, helper
 from contin.levels import APART, LOCATED
 from contin.linalg.periodic import Product, condense, fill_logarithms, product_of
 from contin.linalg.small import fill_eigenvalues

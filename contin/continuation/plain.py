@@ -17,8 +17,8 @@ from contin.core.system import USUAL
 from contin.events.arc import LEAST_COSINE
 from contin.events.crossings import CALM, NEAR_ONE
 from contin.events.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, Stack, helper
 from contin.linalg.ends import is_near_one
 from contin.linalg.small import fill_eigenvalues, solve_small
 

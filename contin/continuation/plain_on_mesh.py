@@ -22,8 +22,8 @@ from contin.core.step import COLLAPSED
 from contin.events.crossings import TURN
 from contin.events.dips import AS_FAR
 from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, Stack, Vector, helper
 from contin.levels import APART
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends

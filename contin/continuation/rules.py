@@ -19,8 +19,8 @@ from contin.core.step import CLEAR, State
 from contin.core.trial import Trial
 from contin.events.folds import STANDS, STILL, dips, ends_low
 from contin.events.inspection import FEWEST, REACH, misses
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Vector, helper
 from contin.levels import APART, CORRECTED, TINY
 
 #: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.

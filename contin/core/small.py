@@ -16,8 +16,8 @@ from contin.arrays import Array
 from contin.core.newton import STAGNANT, Newton
 from contin.functions.batch import Batch
 from contin.functions.interpreter import Loaded, Points, run_loaded
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg import convergence
 from contin.linalg.convergence import judge_update, subtract
 from contin.linalg.small import factor_small, solve_small

@@ -14,8 +14,8 @@ import numpy as np
 
 from contin.core.trial import Event, Trial
 from contin.events.arc import Arc, Place
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix
 
 #: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
 #: little less than the distance pi of 1 from -1, or nearer than so many times its change over the step. A pair can reach -1 and

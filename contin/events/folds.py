@@ -34,7 +34,7 @@ from contin.core.trial import Event, Trial, linearization, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.dips import DEEPER, followed
-from contin.functions.kernel_parts import helper
+from contin.kernels.kernel_parts import helper
 from contin.levels import APART, BESIDE, LAST_PLACES, LOCATED, ROUND_OFF
 from contin.linalg.orientation import oriented
 

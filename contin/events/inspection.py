@@ -34,7 +34,7 @@ from contin.events.branch_points import BranchPointSearch
 from contin.events.dips import separated
 from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
-from contin.functions.kernel_parts import helper
+from contin.kernels.kernel_parts import helper
 from contin.levels import APART, BESIDE, CERTAIN, CORRECTED, DEPENDENT, DOUBLED, ROUGH, ROUND_OFF
 
 #: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or

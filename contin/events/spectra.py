@@ -15,8 +15,8 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.small import Equations, evaluate_slopes
 from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import APART, LOCATED
 from contin.linalg.small import fill_eigenvalues
 

@@ -20,13 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions import kernel_parts as parts
 from contin.functions import round_off
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Builder, IndexMatrix, IndexVector, Matrix, Stack, Value, Vector, helper, instruction
 from contin.functions.primitives import OF_TWO, TABLE, polygamma
 from contin.functions.program import CODES, TIME, Inputs, Program, program
 from contin.functions.tape import Tape
+from contin.kernels import kernel_parts as parts
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Builder, IndexMatrix, IndexVector, Matrix, Stack, Value, Vector, helper, instruction
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
 #: twice as often.

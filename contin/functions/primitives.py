@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from contin.functions.kernel_parts import helper
+from contin.kernels.kernel_parts import helper
 
 #: Places of operands on a tape, and recorded operands.
 Places = tuple[int, ...]

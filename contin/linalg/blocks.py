@@ -21,7 +21,7 @@ import numpy as np
 
 from contin import threads
 from contin.arrays import Array, Indices, Pattern
-from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack
+from contin.kernels.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack
 from contin.threads import PARTS
 
 #: Unknowns that are many: dense factors of 200 take as long as sparse ones, the search for groups of states takes up to .1 s,

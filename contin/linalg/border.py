@@ -35,8 +35,8 @@ import numpy as np
 
 from contin.arrays import Array, Numbers
 from contin.draws import generator
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, helper
 from contin.linalg.blocks import Factors
 from contin.linalg.matrices import DenseFactors
 

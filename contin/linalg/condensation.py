@@ -29,8 +29,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, ReadOnlyMatrix, Stack, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, ReadOnlyMatrix, Stack, helper
 from contin.linalg import vector
 from contin.linalg.blocks import ALL, Blocks, Layout, Share, is_large, run, share
 from contin.linalg.elimination import Eliminated, Range, factorize, group_step, point_step, whole_step

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Vector, helper
 from contin.levels import LOCATED
 
 #: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps

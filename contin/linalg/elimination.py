@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
 from contin.linalg import vector
 from contin.linalg.blocks import Layout, Share
 from contin.linalg.vector import PANEL, Rows, at, copy_rows

@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.border import orthonormalize_row
 from contin.linalg.elimination import Eliminated
 

@@ -31,8 +31,8 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.draws import generator
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import MOST_STEPS, ROUND_OFF, TINY
 from contin.linalg.elimination import Step, eliminate
 from contin.linalg.small import fill_eigenvalues

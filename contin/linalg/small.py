@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, ReadOnlyMatrix, Stack, helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import IndexVector, Matrix, ReadOnlyMatrix, Stack, helper
 from contin.levels import MOST_STEPS
 
 

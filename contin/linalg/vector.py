@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from contin.functions.interpreter import GROUP
-from contin.functions.kernel_parts import Builder, Value, constant, double, for_range, instruction, llvm, variable, whole
+from contin.kernels.kernel_parts import Builder, Value, constant, double, for_range, instruction, llvm, variable, whole
 
 #: Columns that are eliminated together, and rows that are updated together. With 2 elimination takes 1.2 times as long, with 8
 #: 1.1 times. Code for each size up to it is written: with 16 kernels take 2.7 times as long to compile.

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, Vector
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, Stack, Vector
 from contin.linalg import vector
 from contin.linalg.vector import LANES, PANEL, at
 

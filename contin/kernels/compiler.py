@@ -1,4 +1,4 @@
-"""The compiler: numba makes the machine code of kernels. Nothing outside contin/functions imports numba.
+"""The compiler: numba makes the machine code of kernels. Nothing outside contin/kernels imports numba.
 
 The Python function that an object file holds is written here, in LLVM's language: see `_Entry`.
 """
@@ -28,8 +28,8 @@ from numba.core.targetconfig import ConfigStack
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import Signature
 
-from contin.functions.kernel_parts import Helper, Instruction, Place, kernel_of, names_in
-from contin.functions.machine_code import INNER, Code, machine
+from contin.kernels.kernel_parts import Helper, Instruction, Place, kernel_of, names_in
+from contin.kernels.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
 #: Only compiled code calls what numba makes. Kernels make no arrays, so nothing counts who uses one (``_nrt``).
@@ -57,7 +57,7 @@ _CONTIGUOUS, _WRITABLE = 0x0001 | 0x0100, 0x0400
 
 
 def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Code:
-    """Return the machine code of a kernel, as `contin.functions.kernel.kernel` describes it, with the name of its entry.
+    """Return the machine code of a kernel, as `contin.kernels.kernel.kernel` describes it, with the name of its entry.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _refresh() -> None:
 
 @contextlib.contextmanager
 def _own_options(codegen: Any) -> Iterator[None]:
-    """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
+    """Let what is compiled meanwhile be for `contin.kernels.machine_code.machine`, in place of this processor.
 
     It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later. That saves a quarter of the
     time; where one process makes all kernels, it takes 180 MB.
@@ -548,7 +548,7 @@ _LONG = 30
 _SMALL = ("interpret",)
 #: What names of numba's own functions in C begin with.
 _NUMBAS = ("numba_", "NRT_")
-#: Places in the tuple ``self``, see `contin.functions.machine_code.loaded`.
+#: Places in the tuple ``self``, see `contin.kernels.machine_code.loaded`.
 _ARRAY, _NONE, _WRONG = range(3)
 #: What TypeError says.
 _WRONG_ARGUMENTS = b"an argument of a kernel is not of the type in its annotations\0"

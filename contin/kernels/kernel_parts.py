@@ -1,4 +1,4 @@
-"""Parts of kernels: the types of their arguments, and the functions that they call. See `contin.functions.kernel`."""
+"""Parts of kernels: the types of their arguments, and the functions that they call. See `contin.kernels.kernel`."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ KERNELS: dict[Any, Any] = {}
 
 
 def kernel_of(value: Any) -> Any:
-    """Return the `contin.functions.kernel.Kernel` that a global value stands for; None where it is none."""
+    """Return the `contin.kernels.kernel.Kernel` that a global value stands for; None where it is none."""
     return KERNELS.get(value) if callable(value) and value.__hash__ else None
 
 

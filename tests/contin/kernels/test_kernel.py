@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from contin.functions import kernel_parts
-from contin.functions.kernel import Kernel, kernel
-from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
+from contin.kernels import kernel_parts
+from contin.kernels.kernel import Kernel, kernel
+from contin.kernels.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.linalg import vector
 
 
@@ -108,7 +108,7 @@ def test_what_is_called_is_not_part_of_the_length():
 
 
 INNER = """
-from contin.functions.kernel import kernel
+from contin.kernels.kernel import kernel
 from factors import FACTOR
 
 @kernel
@@ -120,8 +120,8 @@ def other(x: int) -> int:
     return 3 * x
 """
 OUTER = """
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import helper
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import helper
 import inner_kernels
 from inner_kernels import inner
 

@@ -1,7 +1,7 @@
 """Machine code on disk, and in memory as Python functions, without a compiler.
 
 The code of a kernel is an object file. It holds a function that Python calls like one of its own: it checks its arguments,
-reads the addresses and shapes of arrays, and calls the kernel. `contin.functions.compiler` writes it. Wheels bring these files
+reads the addresses and shapes of arrays, and calls the kernel. `contin.kernels.compiler` writes it. Wheels bring these files
 linked to a shared library; what is not in there is made where it is wanted, and kept in the cache.
 
 A file in the cache is used only where it is whole, of the wanted key, and finds all functions of other libraries that it calls.

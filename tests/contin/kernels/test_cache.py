@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from contin import ContinError
-from contin.functions import kernel as kernels
-from contin.functions import machine_code
-from contin.functions import machine_code as cache
-from contin.functions.kernel import Kernel
-from contin.functions.kernel_parts import Matrix, Vector, helper
+from contin.kernels import kernel as kernels
+from contin.kernels import machine_code
+from contin.kernels import machine_code as cache
+from contin.kernels.kernel import Kernel
+from contin.kernels.kernel_parts import Matrix, Vector, helper
 
 
 @helper
@@ -104,7 +104,7 @@ def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
 @pytest.mark.full
 def test_the_second_process_makes_kernels_of_modules(tmp_path, monkeypatch):
     (tmp_path / "one_kernel.py").write_text(
-        "from contin.functions.kernel import kernel\n\n@kernel\ndef one(x: int) -> int:\n    return x + 1\n"
+        "from contin.kernels.kernel import kernel\n\n@kernel\ndef one(x: int) -> int:\n    return x + 1\n"
     )
     monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path))
     program = [sys.executable, "-c", kernels._PREPARE, "", str(tmp_path), *sys.path, kernels._END, "one_kernel"]

@@ -7,8 +7,8 @@ A kernel is a Python function whose annotations are its signature:
         for i in range(x.size):
             x[i] *= factor
 
-Its machine code is read from the cache where it is defined. Otherwise `contin.functions.compiler` makes it when the kernel is
-called for the first time, and keeps it. `contin.functions.kernel_parts` has the types of arguments, and what kernels call.
+Its machine code is read from the cache where it is defined. Otherwise `contin.kernels.compiler` makes it when the kernel is
+called for the first time, and keeps it. `contin.kernels.kernel_parts` has the types of arguments, and what kernels call.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ import numpy as np
 
 from contin import threads
 from contin.errors import ContinError
-from contin.functions import machine_code
-from contin.functions.kernel_parts import KERNELS, length, parts
-from contin.functions.machine_code import cache_directory
+from contin.kernels import machine_code
+from contin.kernels.kernel_parts import KERNELS, length, parts
+from contin.kernels.machine_code import cache_directory
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -143,7 +143,7 @@ class Kernel:
                 late = self._files(parts(self.function)) - self.files
                 if late:  # the key would not change with them
                     raise TypeError(f"{self.name}: what it uses of {sorted(late)[0]} must be imported above it")
-                from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
+                from contin.kernels import compiler  # numba takes .3 s, and is needed the first time only
 
                 found = compiler.machine_code(self.function, self.reorder, self.entry)
                 machine_code.keep(self.key, found)
@@ -219,7 +219,7 @@ _PREPARE = f"""
 import sys
 split = sys.argv.index({_END!r}, 1)
 sys.path[:] = sys.argv[1:split]
-from contin.functions.kernel import prepare
+from contin.kernels.kernel import prepare
 prepare(sys.argv[split + 1:])
 """
 
@@ -249,13 +249,16 @@ def _fingerprint(*parts: object) -> str:
 
 
 #: Files that decide what machine code is made of, besides the `Kernel.files`.
-_MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", "program")
+_MADE_BY = (
+    "kernels/compiler", "kernels/kernel", "kernels/kernel_parts", "kernels/machine_code", "functions/primitives",
+    "functions/program",
+)  # fmt: skip
 
 
 @functools.cache
 def _made_by() -> str:
     """Return a fingerprint of the engine's files that kernels and compiler consist of."""
-    return contents(*(Path(__file__).with_name(f"{name}.py") for name in _MADE_BY))
+    return contents(*(Path(__file__).parent.parent / f"{name}.py" for name in _MADE_BY))
 
 
 @functools.cache
