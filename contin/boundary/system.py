@@ -22,7 +22,7 @@ from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolat
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
-from contin.core.system import Inputs, Scales, System, Term, largest_entries, usual
+from contin.core.system import Inputs, Scales, System, Term
 from contin.core.trial import Event
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
@@ -115,7 +115,7 @@ class Collocation(System):
         a, b = problem.domain
         if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
-        self.mesh, self._h, self.intervals = mesh, h, h.size
+        self.mesh, self._h, self.intervals, self._grid = mesh, h, h.size, (mesh, degree)
         self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
         self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
         self._h_points = np.repeat(h, degree)[:, None]
@@ -211,35 +211,6 @@ class Collocation(System):
     def with_reference(self, x: Array) -> Self:
         """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
         return self
-
-    def _with(self, **changes: object) -> Self:
-        """Return the same with other free parameters, parameters or scales."""
-        values = dict(zip(self.problem.parameters, self.parameters))
-        given: dict[str, Any] = {"free": self.free, "parameters": values, "scales": self.scales, **changes}
-        return type(self)(self.problem, self.mesh, self.degree, **given)
-
-    def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """Return the same problem with other values of parameters that are not free."""
-        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
-
-    def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
-        """Return the same problem with other free parameters (values from x), on the same mesh, and x for it."""
-        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other = self._with(free=free, parameters=values)
-        return other, other.pack(self.states(x), values)
-
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
-        rows = {name: np.ones(count) for name, count in self._rows}
-        scaled = self._with(scales=Scales(states, parameters, rows))
-        z = self.carrier(scaled)(x)
-        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
-        return self._with(scales=Scales(states, parameters, found)), z
-
-    def without_scales(self, x: Array) -> tuple[Self, Array]:
-        """Return the same problem in the user's units, and x for it."""
-        other = self._with(scales=None)
-        return other, self.carrier(other)(x)
 
     @property
     def _rows(self) -> tuple[tuple[str, int], ...]:

@@ -254,16 +254,43 @@ class System(Discretization):
         """Return the same with the rounds that angles make in x, unless they are given, and a continuous x."""
         return self, x
 
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.
+    # --- the same with other parameters and sizes -----------------------------------------------------------------
 
-        Kinds of system that have no scales return themselves.
-        """
-        return self, x
+    #: Mesh and degree, of kinds that have them.
+    _grid: tuple[Any, ...] = ()
 
-    def without_scales(self, x: Array) -> tuple[System, Array]:
+    def _with(self, **changes: object) -> Self:
+        """Return the same with other free parameters, parameters or scales."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        given: dict[str, Any] = {"free": self.free, "parameters": values, "scales": self.scales, **changes}
+        return type(self)(self.problem, *self._grid, **given)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the same problem with other values of parameters that are not free."""
+        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
+        """Return the same problem with other free parameters (values from x), and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = self._with(free=free, parameters=values)
+        return other, other.pack(self.states(x), values)
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        rows = {name: np.ones(count) for name, count in self._rows}
+        scaled = self._with(scales=Scales(states, parameters, rows))
+        z = self.carrier(scaled)(x)
+        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
+        return self._with(scales=Scales(states, parameters, found)), z
+
+    def without_scales(self, x: Array) -> tuple[Self, Array]:
         """Return the same problem in the user's units, and x for it."""
-        return self, x
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
+
+    @abstractmethod
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of F_x in the rows that have sizes of their own."""
 
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""
@@ -393,11 +420,3 @@ class System(Discretization):
     @abstractmethod
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
-
-    @abstractmethod
-    def with_parameters(self, values: Mapping[str, float]) -> System:
-        """Return the same problem with other values of parameters that are not free."""
-
-    @abstractmethod
-    def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
-        """Return the same problem with other free parameters (values from x), and x for it."""

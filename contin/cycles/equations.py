@@ -597,8 +597,8 @@ class CycleCollocation(PeriodicCollocation):
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
-    def _with(self, **changes: object) -> CycleCollocation:
-        other: Any = super()._with(**changes)
+    def _with(self, **changes: object) -> Self:
+        other = super()._with(**changes)
         other._set_reference(self.reference)
         return other
 

@@ -252,7 +252,7 @@ class MapSystem(OfCycles, Algebraic):
         states = self.states(x)
         return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
 
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
         """Return the same."""
         return self, x
 

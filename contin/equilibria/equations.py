@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from contin.core.differences import derivative, of_lines
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import Spectral, may_be_on_axis, off_axis
-from contin.core.system import Inputs, Scales, System, Term, largest_entries, usual
+from contin.core.system import Inputs, Scales, System, Term
 from contin.core.trial import Event, Trial
 from contin.defining.critical import HopfCurve, other_pairs
 from contin.draws import ASIDE, generator, signs
@@ -468,26 +468,14 @@ class Algebraic(Spectral, System):
         values = self.eigenvalues(x)
         return complex(values[np.argmin(np.abs(values - value))])
 
-    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
-        scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
-        z = self.carrier(scaled)(x)
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of each row."""
+        found = abs(self._jacobian(x)[1])
+        return {"residual": found.max(axis=1).toarray().ravel() if self.is_sparse else found.max(axis=1, initial=0.0)}
 
-        def entries(at: Array) -> Array:
-            jacobian = abs(scaled._jacobian(at)[1])
-            return jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
-
-        return self._with(scales=Scales(states, parameters, {"residual": usual(largest_entries(entries, z))})), z
-
-    def without_scales(self, x: Array) -> tuple[Algebraic, Array]:
-        """Return the same problem in the user's units, and x for it."""
-        other = self._with(scales=None)
-        return other, self.carrier(other)(x)
-
-    def _with(self, **changes: Any) -> Algebraic:
-        """Return the same with other free parameters, parameters or scales."""
-        kept = {"free": self.free, "parameters": dict(zip(self.problem.parameters, self.parameters)), "scales": self.scales}
-        other = type(self)(self.problem, **{**kept, **changes})
+    def _with(self, **changes: object) -> Self:
+        """Return the same with other free parameters, parameters or scales; with frozen outcomes if these are the same."""
+        other = super()._with(**changes)
         other.sides = self.sides if other.free == self.free else other.sides
         return other
 
@@ -500,16 +488,6 @@ class Algebraic(Spectral, System):
 
     def adapted(self, x: Array, control: MeshControl) -> None:
         """Return None: there is no mesh."""
-
-    def with_parameters(self, values: Mapping[str, float]) -> Algebraic:
-        """Return the same problem with other values of parameters that are not free."""
-        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
-
-    def with_free(self, free: Sequence[str], x: Array) -> tuple[Algebraic, Array]:
-        """Return the same problem with other free parameters (values from x), and x for it."""
-        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other = self._with(free=free, parameters=values)
-        return other, other.pack(self.states(x), values)
 
     # --- what is known of its branches --------------------------------------------------------------------------
 

@@ -69,7 +69,7 @@ def switched(
         return cycles, x, tangent
     found, x = cycles.with_free(checks.names("free", free), x)
     along: Any = found.pack(cycles.states(tangent), dict.fromkeys(found.free, 0.0))
-    return found, x, along  # type: ignore[return-value]  # with_free keeps the kind
+    return found, x, along
 
 
 def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Array]:
