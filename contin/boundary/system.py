@@ -28,7 +28,7 @@ from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
-from contin.levels import CORRECTED
+from contin.levels import APART, CORRECTED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
 from contin.linalg.condensation import Factorization
@@ -95,6 +95,8 @@ class Collocation(System):
     plain = True
     #: Multipliers in a kernel, of cycles.
     monodromy: Any = None
+    #: The vector of unknowns that conditions beyond those of the problem refer to; empty without one.
+    reference: Array = np.empty(0)
 
     def __init__(
         self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
@@ -192,25 +194,44 @@ class Collocation(System):
         states = self._interpolator(other.nodes)
         return self._between_scales(lambda x: np.concatenate([states(x).ravel(), x[self.state_size :]]), other)
 
-    def _copied(self, without: Sequence[str] = ()) -> Self:
-        """Return a copy with all that was computed, which ``copy.copy`` leaves out, but for what is to change."""
+    def _copied(self) -> Self:
+        """Return a copy with all that was computed, which ``copy.copy`` leaves out."""
         other = object.__new__(type(self))
-        vars(other).update({name: value for name, value in vars(self).items() if name not in without})
+        vars(other).update(vars(self))
         return other
 
     def on_mesh(self, mesh: Places) -> tuple[Self, Carrier]:
         """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""
         other = self._copied()
         other._take_mesh(np.array(mesh, dtype=float))
-        return other, self.carrier(other)
+        carry = self.carrier(other)
+        if self.reference.size:
+            other._refer(carry(self.reference))
+        return other, carry
 
     def refined(self) -> tuple[Self, Carrier]:
         """Return the same problem with every interval halved, and the carrier."""
         return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
 
     def with_reference(self, x: Array) -> Self:
-        """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
+        """Return the same with x as the reference, where a kind of problem has one."""
         return self
+
+    def _refer(self, x: Array) -> None:
+        """Take x as the reference."""
+
+    def _referring_to(self, x: Array) -> Self:
+        """Return the same with x as the reference."""
+        other = self._copied()
+        other._refer(x)
+        return other
+
+    def _with(self, **changes: object) -> Self:
+        """Return the same with other free parameters, parameters or scales, and with the same reference."""
+        other, known = super()._with(**changes), self.reference
+        if known.size:
+            other._refer(other.pack(self.states(known), dict(zip(self.problem.parameters, self.all_parameters(known)))))
+        return other
 
     @property
     def _rows(self) -> tuple[tuple[str, int], ...]:
@@ -519,14 +540,14 @@ class Collocation(System):
     # --- meshes that suit a solution -----------------------------------------------------------------------------
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
-        """Return the same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
-        mesh = self._better_mesh(x, control)
-        return None if mesh is None else self.on_mesh(mesh)
-
-    def _better_mesh(self, x: Array, control: MeshControl) -> Array | None:
-        if not control.every:
+        """Return the same on a better mesh for x and with x as the reference, and the carrier; None where there is no need."""
+        mesh, known = None, self.reference
+        if control.every:
+            mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control, self._all_breaks(x, closely=False))
+        if mesh is None and (not known.size or np.abs(x - known).max() <= APART * np.abs(x).max()):
             return None
-        return adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control, self._all_breaks(x, closely=False))
+        renewed = self._referring_to(x) if known.size else self
+        return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
 
     def on_breaks(self) -> Self:
         """Return the same problem on a mesh of as many intervals, with the breaks among its points."""

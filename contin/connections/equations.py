@@ -12,14 +12,12 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
 from contin.boundary.system import Collocation
-from contin.collocation.mesh import MeshControl
 from contin.collocation.newton import Values
 from contin.collocation.projection import Projections, projections
 from contin.connections.branches import homoclinic_points, named, own_test_of
 from contin.core.differences import Numbers, alike, classes, shares, subsets
-from contin.core.protocol import Carrier
 from contin.core.spectral import KEPT
-from contin.core.system import Scales, System
+from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.defining.special_points import EventCurve
 from contin.draws import generator
@@ -80,10 +78,8 @@ class ConnectionCollocation(Collocation):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         check_windings(self.problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
-        self.reference: Array = np.empty(0)
 
     def _take_mesh(self, mesh: Array) -> None:
-        vars(self).pop("_known", None)
         super()._take_mesh(mesh)
         self.equations = self._conditions + int(sum(self.problem.conditions) + self.problem.saddle_node + 1)
 
@@ -96,14 +92,17 @@ class ConnectionCollocation(Collocation):
 
     def with_reference(self, x: Array) -> Self:
         """Return the same with v and Q of the orbit x."""
-        other = self._copied(without=_OF_A_REFERENCE)
-        other.reference = np.array(x)
-        other._phase = other.phase_row(other._scaled_states(x))
-        other._target = float(other._phase @ x)
-        other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)))
-        left, _, right = np.linalg.svd(other.saddle_jacobian(x))
-        other._borders = left[:, -1], right[-1]
-        return other
+        return self._referring_to(x)
+
+    def _refer(self, x: Array) -> None:
+        for name in _OF_A_REFERENCE:
+            vars(self).pop(name, None)
+        self.reference = x.copy()
+        self._phase = self.phase_row(self._scaled_states(x))
+        self._target = float(self._phase @ x)
+        self._bases = tuple(_orthonormal(left) for left in self._left_vectors(self.all_parameters(x)))
+        left, _, right = np.linalg.svd(self.saddle_jacobian(x))
+        self._borders = left[:, -1], right[-1]
 
     _phase: Array
     _target: float
@@ -480,30 +479,6 @@ class ConnectionCollocation(Collocation):
         states, places = self.states(x), self._places(self.all_parameters(x)[None])
         apart = [float(np.abs(states[-end] - place[0]).max()) for end, place in enumerate(places)]
         return np.array([max(apart) / (float(np.ptp(states, axis=0).max()) or 1.0)])
-
-    # --- meshes and references -----------------------------------------------------------------------------------
-
-    def _with(self, **changes: object) -> Self:
-        other = super()._with(**changes)
-        return other.with_reference(self._carried(other)) if self.reference.size else other
-
-    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
-        """Return the same on another mesh, with the same reference, and the carrier."""
-        other, carry = super().on_mesh(mesh)
-        return other.with_reference(carry(self.reference)) if self.reference.size else other, carry
-
-    def _carried(self, other: System) -> Array:
-        """Return the reference as a vector of unknowns of another system of this problem."""
-        states = self.states(self.reference)
-        return other.pack(states, dict(zip(self.problem.parameters, self.all_parameters(self.reference))))
-
-    def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
-        """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
-        mesh = self._better_mesh(x, control)
-        if mesh is None and np.abs(x - self.reference).max() <= APART * np.abs(x).max():
-            return None
-        renewed = self.with_reference(x)
-        return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
 
     # --- what is known of its branches --------------------------------------------------------------------------
 

@@ -14,10 +14,9 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
-from contin.collocation.mesh import MeshControl
 from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
 from contin.core.labels import Label
-from contin.core.protocol import Carrier, Discretization
+from contin.core.protocol import Discretization
 from contin.core.spectral import KEPT, on_circle
 from contin.core.step import COLLAPSED, Reason, Stop
 from contin.core.system import Scales
@@ -478,8 +477,8 @@ class CycleCollocation(PeriodicCollocation):
 
     Attributes
     ----------
-    reference : ndarray, shape (K, n)
-        The states of v at the nodes, in the user's units; zero where `with_reference` has not set it.
+    reference : ndarray, shape (size,)
+        The cycle v; zero where `with_reference` has not set it.
     """
 
     def __init__(
@@ -487,7 +486,7 @@ class CycleCollocation(PeriodicCollocation):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        self._set_reference(np.zeros((self.nodes.size, self._n)))
+        self._refer(np.zeros(self.size))
 
     def _take_mesh(self, mesh: Array) -> None:
         super()._take_mesh(mesh)
@@ -498,11 +497,11 @@ class CycleCollocation(PeriodicCollocation):
             self.weights[self.state_size + at] = _PERIOD_SHARE / (1 + known) ** 2
         self._drifted: set[bytes] = set()
 
-    def _set_reference(self, reference: Array) -> None:
-        """Take the phase row from an orbit, states at the nodes."""
-        self.reference = reference
+    def _refer(self, x: Array) -> None:
+        """Take the phase row from an orbit."""
+        self.reference = x.copy()
         self._amplitude: Array | None = None
-        scaled = reference / self.scales.states
+        scaled = self._scaled_states(x)
         self._phase = self.phase_row(scaled)
         self._target = float(self._phase[: self.state_size] @ scaled.ravel()) if self.rotates else 0.0
 
@@ -522,7 +521,8 @@ class CycleCollocation(PeriodicCollocation):
     @property
     def start_direction(self) -> Array:
         """The direction in which the reference leaves t = 0, scaled, shape (n,)."""
-        first = (self.reference[1] - self.reference[0]) / self.scales.states
+        states = self._scaled_states(self.reference)
+        first = states[1] - states[0]
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
     def _computed(self, x: Array) -> ComplexArray:
@@ -578,8 +578,8 @@ class CycleCollocation(PeriodicCollocation):
     @property
     def _varying(self) -> tuple[Array, Array]:
         """The weights of the nodes, and the reference without its mean."""
-        weights = self.weights[: self.state_size : self._n]
-        return weights, self.reference - self._mean_turn @ (weights @ self.reference)
+        weights, states = self.weights[: self.state_size : self._n], self.states(self.reference)
+        return weights, states - self._mean_turn @ (weights @ states)
 
     @functools.cached_property
     def _mean_turn(self) -> Array:
@@ -595,19 +595,7 @@ class CycleCollocation(PeriodicCollocation):
             self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 
-    # --- meshes and references -----------------------------------------------------------------------------------
-
-    def _with(self, **changes: object) -> Self:
-        other = super()._with(**changes)
-        other._set_reference(self.reference)
-        return other
-
-    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
-        """Return the same on another mesh, with the same reference, and the carrier."""
-        other, carry = super().on_mesh(mesh)
-        known = np.concatenate([(self.reference / self.scales.states).ravel(), np.zeros(len(self.free))])
-        other._set_reference(other.states(carry(known)))
-        return other, carry
+    # --- the reference -----------------------------------------------------------------------------------
 
     def with_reference(self, x: Array) -> Self:
         """Return the same with the orbit x as the reference.
@@ -617,24 +605,9 @@ class CycleCollocation(PeriodicCollocation):
         ProblemError
             It is constant.
         """
-        states = self.states(x)
-        if not np.ptp(states, axis=0).any():
+        if not np.ptp(self.states(x), axis=0).any():
             raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
-        return self._referring_to(states)
-
-    def _referring_to(self, states: Array) -> Self:
-        """Return the same on the same mesh, with a reference given by its states at the nodes."""
-        other = self._copied()
-        other._set_reference(states)
-        return other
-
-    def adapted(self, x: Array, control: MeshControl) -> tuple[Self, Carrier] | None:
-        """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
-        mesh, states = self._better_mesh(x, control), self.states(x)
-        if mesh is None and np.abs(states - self.reference).max() <= APART * np.abs(states).max():
-            return None
-        other = self._referring_to(states)
-        return (other, np.array) if mesh is None else other.on_mesh(mesh)
+        return self._referring_to(x)
 
     # --- what is known of its branches --------------------------------------------------------------------------
 
