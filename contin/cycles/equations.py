@@ -29,7 +29,6 @@ from contin.draws import ASIDE
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.normal_forms import Coefficient, at_special_point
-from contin.functions.batch import Columns
 from contin.levels import APART, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import Blocks, Factors
 from contin.linalg.condensation import Factorization
@@ -253,13 +252,7 @@ class PeriodicCollocation(OfCycles, Collocation):
         """
         n, times = self._n, np.zeros(len(points)) if self.autonomous else self.gauss_times
         given = times, points, np.empty((0, n)), self._scaled_parameters(x)
-        derivatives: Array = self._field.jacobian(*given, self._by_states)[1]
-        return derivatives[:, :n, :n]
-
-    @functools.cached_property
-    def _by_states(self) -> Columns:
-        """Columns of the field's derivatives by the states."""
-        return self.problem.batch("field").columns([])
+        return self._field.jacobian(*given, self._field.columns([]))[1][:, :n]
 
     def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""

@@ -29,7 +29,7 @@ from contin.events.arc import SpecialPoint
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
-from contin.functions.batch import Batch, Columns
+from contin.functions.batch import Batch
 from contin.functions.origin import source
 from contin.levels import CERTAIN, CORRECTED, LOCATED
 from contin.linalg.blocks import MANY, Factors
@@ -206,7 +206,7 @@ class Algebraic(Spectral, System):
     @property
     def nodes(self) -> Array:
         """One place, shape (1,)."""
-        return _NO_TIME
+        return np.zeros(1)
 
     @property
     def named_states(self) -> tuple[str, ...]:
@@ -255,22 +255,16 @@ class Algebraic(Spectral, System):
         return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), by_x)
 
     @functools.cached_property
-    def _residual(self) -> Any:
+    def _residual(self) -> Batch:
         """The residual, compiled."""
         batch = self._batch("residual", ("residual",))
         return batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
 
     @functools.cached_property
-    def _by_unknowns(self) -> Columns:
-        """Columns of the residual's derivatives by the unknowns."""
-        return self._residual.columns(self._free)
-
-    @functools.cached_property
-    def _by_states(self) -> tuple[Batch, Columns]:
-        """The residual in the user's units, and columns of its derivatives by the states."""
+    def _unscaled(self) -> Batch:
+        """The residual in the user's units."""
         batch = self.problem.batch("residual")
-        batch = batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
-        return batch, batch.columns([])
+        return batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
 
     # --- conditions that unknowns decide -------------------------------------------------------------------------
 
@@ -298,15 +292,13 @@ class Algebraic(Spectral, System):
 
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
-        batch, columns = self._deciding
-        values, slopes = batch.jacobian(*self._terms[0].inputs(x), columns)
+        values, slopes = self._deciding.jacobian(*self._terms[0].inputs(x), self._deciding.columns(self._free))
         return values[0], slopes[0]
 
     @functools.cached_property
-    def _deciding(self) -> tuple[Batch, Columns]:
-        """The numbers that decide, and columns of their derivatives."""
-        batch = self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
-        return batch, batch.columns(self._free)
+    def _deciding(self) -> Batch:
+        """The numbers that decide."""
+        return self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
 
     def slopes(self, x: Array) -> Array:
         """Return F_x, shape (equations, size)."""
@@ -319,8 +311,7 @@ class Algebraic(Spectral, System):
         one."""
         if self.problem.jacobian is not None:
             return self.state_size >= MANY and self.problem.gives_sparse_matrix
-        entries = self._by_unknowns.rows.size
-        return self.state_size >= MANY and entries <= _FEW * self.size * self.equations
+        return self.state_size >= MANY and self._terms[0].columns.rows.size <= _FEW * self.size * self.equations
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
@@ -328,7 +319,7 @@ class Algebraic(Spectral, System):
         if self.problem.jacobian is not None:
             check_given(self.problem, self.states(x)[0], self.all_parameters(x))
             return self._given_jacobian(x, given)
-        columns = self._by_unknowns
+        columns = self._terms[0].columns
         if not self.is_sparse:
             values, jacobian = self._residual.jacobian(*given, columns)
             return values[0], jacobian[0]
@@ -424,9 +415,7 @@ class Algebraic(Spectral, System):
         p = self.all_parameters(x)
         if self.problem.jacobian is not None:
             return np.array([_dense(self.problem.jacobian_at(u, p)) for u in states])
-        batch, columns = self._by_states
-        times = _NO_TIME if len(states) == 1 else np.zeros(len(states))
-        return batch.jacobian(times, states, self._none, p, columns)[1]
+        return self._unscaled.jacobian(np.zeros(len(states)), states, self._none, p, self._unscaled.columns([]))[1]
 
     def field_jacobian(self, x: Array) -> Array:
         """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
@@ -580,8 +569,6 @@ class Algebraic(Spectral, System):
 
 #: Largest part of its entries that may differ from zero.
 _FEW = 0.1
-#: The t of functions that do not take it.
-_NO_TIME = np.zeros(1)
 
 
 def _dense(matrix: Any) -> Array:
