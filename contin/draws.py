@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Numbers
 
 #: ``CONTIN_DRAWS=1`` (2, 3, ...) in the environment changes all seeds: labels must be the same, and values within their errors.
 _SEED = int(os.environ.get("CONTIN_DRAWS") or 0)
@@ -34,3 +35,9 @@ def signs(random: np.random.Generator, like: Array) -> Array:
 def rounded(random: np.random.Generator, x: Array) -> Array:
     """Return numbers moved up or down by one unit in the last place."""
     return x * (1 + np.finfo(float).eps * signs(random, x))
+
+
+def spread(word: str, change: Callable[[np.random.Generator], Numbers | float]) -> Array:
+    """Return the largest size of changes by round-off: ``change`` is called `DRAWS` times with random numbers of this word."""
+    random = generator(word)
+    return np.asarray(np.max([np.abs(change(random)) for _ in range(DRAWS)], axis=0))

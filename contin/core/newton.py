@@ -344,13 +344,12 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
     """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
-    random, noise = draws.generator("newton"), np.zeros_like(x)
-    residual, factors = system.linearize(x, rows)
-    for _ in range(draws.DRAWS):
-        rounded = draws.rounded(random, x)
-        change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
-        noise = np.maximum(noise, np.abs(factors.solve(change)))
-    return noise
+    (residual, factors), none = system.linearize(x, rows), np.zeros(len(rows))
+
+    def change(random: np.random.Generator) -> Array:
+        return factors.solve(np.append(system.residual(draws.rounded(random, x)) - residual, none))
+
+    return draws.spread("newton", change)
 
 
 def _chords(

@@ -84,12 +84,13 @@ def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: C
     ``again(signs)`` computes them again; ``signs(array)`` are random signs of the shape of an array. Imaginary parts are alike
     up to multiples of ``full``.
     """
-    random, found = draws.generator("rounding"), np.zeros(len(values))
-    for _ in range(draws.DRAWS):
+
+    def change(random: np.random.Generator) -> Array:
         gaps = values[:, None] - again(lambda array: draws.signs(random, array))
         imaginary = gaps.imag if full == math.inf else (gaps.imag + full / 2) % full - full / 2
-        found = np.maximum(found, np.hypot(gaps.real, imaginary).min(axis=1))
-    return found
+        return np.hypot(gaps.real, imaginary).min(axis=1)
+
+    return draws.spread("rounding", change)
 
 
 def changes_of_multipliers(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: ComplexArray) -> Array:

@@ -328,7 +328,7 @@ class Algebraic(Spectral, System):
         residual, entries = self._residual.entries(*given, columns)
         return residual[0], csr_array((entries[0], (columns.rows, columns.places)), shape=(self.equations, self.size))
 
-    def _given_jacobian(self, x: Array, given: Any) -> tuple[Array, Any]:
+    def _given_jacobian(self, x: Array, given: Inputs) -> tuple[Array, Any]:
         """Return the same with the derivatives by states from the user's function."""
         values, by_parameters = self._residual.jacobian(*given, self._residual.columns(self._free, ()))
         matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))

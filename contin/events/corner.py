@@ -174,8 +174,7 @@ def zeros(system: Any, x: Array) -> list[int]:
 
 def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
     """Return the ways that leave x with any outcomes of conditions, why some have none, and whether slopes jump."""
-    found, missing, slopes, noise = list[Way](), "", list[Array](), 0.0
-    random = draws.generator("corner")
+    found, missing, slopes, noise = list[Way](), "", list[Array](), np.zeros(1)
     held, few = system.sides[list(zero)], len(zero) <= _MOST
     for sides in (
         itertools.product((1.0, -1.0), repeat=len(zero)) if few else (held, -held, *held * (1 - 2 * np.eye(len(zero))))
@@ -189,9 +188,9 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
             if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
                 missing = "the equations jump"
                 continue
-            moved = [there.slopes(draws.rounded(random, x)) for _ in range(draws.DRAWS)]
             slopes.append(jacobian)
-            noise = np.maximum(noise, np.abs(np.array(moved) - jacobian).max(axis=0))
+            changes = draws.spread("corner", lambda random: there.slopes(draws.rounded(random, x)) - jacobian)  # noqa: B023
+            noise = np.maximum(noise, changes)
             tangents = _tangents(there, x)
         rates = np.array(sides)[:, None] * there.numbers(x)[1][list(zero)]
         still = LOCATED * np.linalg.norm(rates, axis=1)

@@ -82,12 +82,13 @@ def _noise(trial: Trial, fold: Event) -> float:
     size, own = (float(np.linalg.norm(vector[: system.state_size])) for vector in (x, tangent))
     if not size:
         return 0.0
-    random, noise, at = draws.generator("significance"), 0.0, system.parameter_index(fold.name)
     residual, factors = system.linearize(x, (system.weights * tangent,))
-    for _ in range(draws.DRAWS):
+
+    def change(random: np.random.Generator) -> float:
         error = system.residual(draws.rounded(random, x)) - residual
-        noise = max(noise, abs(factors.solve(np.append(error * draws.signs(random, error), 0.0))[at]))
-    return float(UNITS * noise * own / size)
+        return float(factors.solve(np.append(error * draws.signs(random, error), 0.0))[system.parameter_index(fold.name)])
+
+    return float(UNITS * draws.spread("significance", change) * own / size)
 
 
 def growing(system: Discretization, x: Array, tangent: Array, primary: str, newton: Newton) -> Array:

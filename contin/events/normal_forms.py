@@ -74,12 +74,11 @@ class Coefficient:
         best, of_derivatives = system.with_derivative_error(lambda: terms(x))
         value, size = float(best.sum().real), float(np.abs(best).sum())
 
+        def change(random: np.random.Generator) -> float:
+            return value - float(terms(x + ROUND_OFF * (1 + np.abs(x)) * draws.signs(random, x)).sum().real)
+
         def estimate() -> float:
-            random, changes = draws.generator("coefficient"), []
-            for _ in range(draws.DRAWS):
-                moved = x + ROUND_OFF * (1 + np.abs(x)) * draws.signs(random, x)
-                changes.append(abs(value - float(terms(moved).sum().real)))
-            return float(CERTAIN * max(changes) + of_derivatives * size)
+            return float(CERTAIN * draws.spread("coefficient", change) + of_derivatives * size)
 
         return cls(value, size, estimate)
 

@@ -174,8 +174,8 @@ def _update(system: System, x: Array) -> Array:
 
 def _noise(system: System, x: Array) -> Array:
     """Return by how much each residual changes where x changes by one unit in the last place."""
-    random, residual = draws.generator("failure of solve"), system.residual(x)
-    return np.max([np.abs(system.residual(draws.rounded(random, x)) - residual) for _ in range(draws.DRAWS)], axis=0)
+    residual = system.residual(x)
+    return draws.spread("failure of solve", lambda random: system.residual(draws.rounded(random, x)) - residual)
 
 
 def _is_solution(system: System, z: Array, guess: Array) -> bool:
