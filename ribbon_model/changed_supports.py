@@ -1,24 +1,29 @@
 """A state of a network as a state of the same network with other supports: the reactions become loads.
 
-As for the last end of an open strip (`ribbon_model.changed_ends`), the network does not move. What its supports prescribe has
-the values of the state. Each joint whose support has changed has dead forces along the axes along which it can move, and a dead
-moment about its axis if it is a hinge; their numbers follow from the balance at the ends.
+The network does not move. What its supports prescribe (place, angles) has the values of the state. Each joint whose support has
+changed has dead forces along the directions in which it can move, and a dead moment about its axis if it is a hinge. Their
+numbers, and the multipliers of the new conditions, follow from the conditions at the ends, which are linear in them
+(`contin.VariationalProblem`):
+
+    lambda(t0) = d(Phi + sigma.e)/dx(t0),    lambda(t1) = -d(Phi + sigma.e)/dx(t1).
+
+What is left over is a reaction that no load replaces: then the state is no equilibrium with the new supports.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from contin import Point
-from contin.lowlevel import Collocation
+from contin.lowlevel import Collocation, correct, levels, point_of
 from ribbon_model import ends
-from ribbon_model.changed_ends import balanced, held_angles
-from ribbon_model.ends import ANGLES, FREE, FREE_END, HINGED, End
+from ribbon_model.ends import FREE, FREE_END, End
 from ribbon_model.loads import FORCES, replacing_loads
 from ribbon_model.members import Load
-from ribbon_model.network import MOVES, Network
+from ribbon_model.network import Network
 
 #: Behind the name of a joint: its dead forces along the axes of the drawing, and its dead moment.
 _NAMES = dict(zip((*FORCES, "moment"), ("force_x", "force_y", "force_z", "moment")))
@@ -36,7 +41,7 @@ def replacing(joint: str, end: End | None) -> dict[str, Load]:
     for name in replacing_loads(now):
         if name in axes:
             found[f"{joint}_{_NAMES[name]}"] = Load([(joint, axes[name], (0.0, 0.0, 0.0))])
-        elif now.rotation == HINGED:
+        else:
             found[f"{joint}_{_NAMES[name]}"] = Load(moments=[(joint, 1.0)])
     return found
 
@@ -67,18 +72,11 @@ def with_supports(
     values = {name: before.get(name, value) for name, value in network.parameters.items()}
     for name, end in network.held.items():
         values |= {number: x for number, x in held_at(network, point, name, end).items() if number in values}
-    values = balanced(network, states, values, unknown, _UNBALANCED) | dict(numbers or {})
+    values = balanced(network, states, values, unknown, network.unbalanced(point)) | dict(numbers or {})
     system = Collocation(
         network.problem, point.system.mesh, point.system.degree, (follow, *network.problem.multipliers), values
     )
     return system, system.pack(states, values)
-
-
-#: Why a state is not one with other supports.
-_UNBALANCED = (
-    "the supports let go of what no load replaces: a dead force replaces that of a joint which is let go, a dead moment the "
-    "one about the axis of its new hinge; bring other reactions to zero first"
-)
 
 
 def held_at(network: Network, point: Point, joint: str, end: End = FREE_END) -> dict[str, float]:
@@ -96,8 +94,75 @@ def held_at(network: Network, point: Point, joint: str, end: End = FREE_END) -> 
     >>> abs(held_at(beam, state, "B")["B_dz"]) < 1e-12
     True
     """
-    before, away = point.parameters, network.place(point, joint) - network.drawn_place(joint)
-    moves, angles = (tuple(f"{joint}_{name}" for name in names) for names in (MOVES, ANGLES))
-    known = [before.get(angle, 0.0) for angle in angles] if angles[0] in before else None
-    now = end if end.rotation != FREE else ends.CLAMP
-    return dict(zip(moves, map(float, away))) | dict(zip(angles, held_angles(now, network.frame(point, joint), known)))
+    before, names = point.parameters, network.names_at(joint)
+    known = [before.get(angle, 0.0) for angle in names[3:]] if names[3] in before else None
+    angles = held_angles(end if end.rotation != FREE else ends.CLAMP, network.frame(point, joint), known)
+    away = [
+        before[name] if abs(before.get(name, math.inf) - x) < levels.LOCATED else float(x)
+        for name, x in zip(names, network.displacement(point, joint))
+    ]  # fmt: skip
+    return dict(zip(names, (*away, *angles)))
+
+
+def held_angles(end: End, q, known: Sequence[float] | None) -> tuple[float, ...]:
+    """Return turn, bend and swing that an end with a quaternion has: the known ones where they hold it so, or next to them."""
+    if known is not None:
+        missed = ends.rotation_conditions(end)(q, ends.prescribed(*known))
+        if max(map(abs, missed), default=0.0) < levels.LOCATED:
+            return tuple(known)
+    return angles_near(q, known or (0.0, 0.0, 0.0))
+
+
+def angles_near(q, near) -> tuple[float, float, float]:
+    """Return turn, bend and swing of a quaternion; of all that stand for its rotation, those next to the given ones."""
+    turn, bend, swing = ends.angles_of(q)
+    both = (turn, bend, swing), (turn + math.pi, math.pi - bend, swing + math.pi)
+    found = [[a + 2 * math.pi * round((b - a) / (2 * math.pi)) for a, b in zip(angles, near)] for angles in both]
+    best = min(found, key=lambda angles: math.dist(angles, near))
+    return best[0], best[1], best[2]
+
+
+def corrected(network: Network, near: Collocation, states: np.ndarray, values: Mapping[str, float]) -> Point:
+    """Return the state of a network with these numbers next to given states (K, 2n) at the nodes of a system.
+
+    Raises
+    ------
+    ConvergenceError
+        There is none nearby.
+    """
+    multipliers = network.problem.multipliers
+    values = fitted(network, states, dict(values), multipliers)[0]
+    system = Collocation(network.problem, near.mesh, near.degree, multipliers, values)
+    return point_of(system, correct(system, system.pack(states, values)).x)
+
+
+def balanced(
+    network: Network, states: np.ndarray, values: dict[str, float], replacing: Sequence[str], unbalanced: str
+) -> dict[str, float]:  # fmt: skip
+    """Return the values with the loads and multipliers that replace the reactions.
+
+    Raises
+    ------
+    ValueError
+        A condition does not hold, or a reaction is replaced by nothing: ``unbalanced``.
+    """
+    problem = network.problem
+    values, left = fitted(network, states, values, [*replacing, *problem.multipliers])
+    conditions = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
+    if left[:conditions].max(initial=0.0) > levels.APART:
+        raise ValueError("they hold a place or a rotation that the state does not have (the first end has moved or turned)")
+    if left[conditions:].max(initial=0.0) > levels.APART * (1 + np.abs(states[[0, -1], states.shape[1] // 2 :]).max()):
+        raise ValueError(unbalanced)
+    return values
+
+
+def fitted(network: Network, states: np.ndarray, values: dict[str, float], unknown) -> tuple[dict[str, float], np.ndarray]:
+    """Return the values with those of the unknown numbers that fit the conditions at the ends best, and what is left."""
+    problem, order = network.problem, list(network.problem.parameters)
+    p = np.array([values.get(name, problem.parameters[name]) for name in order])
+    places = np.array([order.index(name) for name in unknown], dtype=np.int64)
+    batch = problem.batch("boundary")
+    missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.columns(places))
+    missed, by_unknown = missed[0], slopes[0][:, 2 * states.shape[1] :]
+    change = np.linalg.lstsq(by_unknown, -missed, rcond=None)[0]
+    return values | dict(zip(unknown, (p[places] + change).tolist())), np.abs(missed + by_unknown @ change)

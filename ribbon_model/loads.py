@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from ribbon_model.ends import DIRECTIONS, HINGED, JOINT, LOOSE, End
 #: (along ``weight_direction``), stiffness per length of a foundation.
 FORCES = ("force_width", "force_normal", "force_tangent")
 LOADS = (*FORCES, "moment", "weight", "foundation")
+#: Those that replace reactions of the last end.
+REPLACING = (*FORCES, "moment")
 #: A further displacement of the last end, along ``stroke_direction``.
 STROKE = "stroke"
 
@@ -48,32 +50,6 @@ def distributed(weight: ends.Vector | None, foundation: ends.Vector | None, grou
         if foundation is not None:
             offset = foundation[0] * x.x1 + foundation[1] * x.x2 + foundation[2] * x.x3 - ground
             value = value + p.foundation * offset * offset / 2
-        return value
-
-    return potential
-
-
-def at_the_end(loads: Collection[str], finish: End, prescribed: Callable) -> Callable | None:
-    """Return the potential of the dead loads at the last end, as a function of (a, b, p); None without one.
-
-    ``prescribed(p)`` gives turn, bend and swing of that end before its place.
-    """
-    along = [name in loads for name in FORCES]
-    moment, angle, frame = "moment" in loads, ends.angle_of(finish), ends.prescribed
-    if not any(along) and not moment:
-        return None
-    width, normal, tangent = along
-
-    def potential(a, b, p):
-        value = 0.0
-        if width:
-            value = value - p.force_width * b.x1
-        if normal:
-            value = value - p.force_normal * b.x2
-        if tangent:
-            value = value - p.force_tangent * b.x3
-        if moment:
-            value = value - p.moment * angle(b[:4], frame(*prescribed(p)[:3]))
         return value
 
     return potential

@@ -228,15 +228,19 @@ class Network:
         """Names of the numbers that prescribe held joints."""
         return tuple(name for joint in self.held for name in self.numbers_at(joint) if name)
 
-    def numbers_at(self, joint: str) -> tuple[str, ...]:
-        """Return the names of the numbers that prescribe the place of a held joint along the axes, then turn, bend and swing.
+    def names_at(self, joint: str) -> tuple[str, ...]:
+        """Return the names of the numbers for the place of a joint along the axes, then turn, bend and swing, were all held.
 
-        Those that are not held, or have no number, are ''.
+        They are '' where nothing moves its support.
         """
+        end = self.held.get(joint)
+        return (end.numbers or ("",) * 6) if isinstance(end, Support) else tuple(f"{joint}_{x}" for x in (*MOVES, *ANGLES))
+
+    def numbers_at(self, joint: str) -> tuple[str, ...]:
+        """Return the same for a joint that is held; '' where it is not."""
         end = self.held[joint]
-        names = end.numbers if isinstance(end, Support) else [f"{joint}_{name}" for name in (*MOVES, *ANGLES)]
         held = [*(any(parts) for parts in zip((0,) * 3, *end.held)), *[end.rotation != FREE] * 3]
-        return tuple(name if has else "" for name, has in zip(names or ("",) * 6, held))
+        return tuple(name if has else "" for name, has in zip(self.names_at(joint), held))
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
@@ -459,8 +463,8 @@ class Network:
                 else:
                     found += rotation(frame, frame_of(p))
                 found += position(place, place_of(p))
-            for number, holds in enumerate(holding, 7):
-                found += [x[number] for x in a] + ([sum(x[number] for x in b)] if holds else [])
+            found += [x[number] for number, _ in enumerate(holding, 7) for x in a]
+            found += [sum(x[number] for x in b) for number, holds in enumerate(holding, 7) if holds]
             return found + (floating(a) if floating else [])
 
         return conditions
@@ -493,10 +497,7 @@ class Network:
 
     def _prescribing(self, name: str, end: End) -> tuple[Callable, Callable, Callable, Callable]:
         """Return prescribed frame and place of a joint as functions of p, and the conditions for both."""
-        names, origin, strokes = self.numbers_at(name), None, ()
-        if isinstance(end, Support):
-            origin, strokes = end.origin, end.strokes
-        drawn = self.drawn_place(name) if origin is None else origin
+        names, (drawn, strokes) = self.numbers_at(name), self._from(name)
 
         def frame_of(p):
             return ends.prescribed(*(getattr(p, angle) for angle in names[3:])) if names[5] else _UNTURNED
@@ -508,6 +509,12 @@ class Network:
             return place
 
         return frame_of, place_of, ends.rotation_conditions(end), ends.place_conditions(end)
+
+    def _from(self, joint: str) -> tuple[Sequence[float], Sequence[tuple[str, Vector]]]:
+        """Return the place from which displacements of a joint count, and the strokes that add to them."""
+        end = self.held.get(joint)
+        origin, strokes = (end.origin, end.strokes) if isinstance(end, Support) else (None, ())
+        return self.drawn_place(joint) if origin is None else origin, strokes
 
     @functools.cached_property
     def prescriptions(self) -> dict[str, tuple[Callable, Callable]]:
@@ -991,6 +998,19 @@ class Network:
         """Return the place (3,) of a joint."""
         first = self.joints[joint].members[0]
         return _at_arm(self._state(point, first)[:7], first.arm)
+
+    def displacement(self, point: Point, joint: str) -> np.ndarray:
+        """Return the displacement (3,) of a joint that its numbers prescribe, as far as it is held."""
+        origin, strokes = self._from(joint)
+        moved = sum((point.parameters.get(number, 0.0) * np.array(direction) for number, direction in strokes), np.zeros(3))
+        return self.place(point, joint) - origin - moved
+
+    def unbalanced(self, point: Point) -> str:
+        """Return that reactions of a state are replaced by nothing, if other supports hold the network."""
+        return (
+            "the supports let go of what no load replaces: a dead force replaces that of a joint which is let go, a dead "
+            "moment the one about the axis of its new hinge; bring other reactions to zero first"
+        )
 
     def frame(self, point: Point, joint: str) -> tuple:
         """Return the quaternion of the joint frame, the identity in the drawing."""

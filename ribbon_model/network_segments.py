@@ -469,6 +469,8 @@ def unsupported(network: Network) -> str:
     """Return why there are no chains of segments of a network, '' if there are."""
     if network.phases:
         return "a network with phases"
+    if network.roller is not None:
+        return "a strip with a roller"
     for name in ("pressure", "field"):
         if name in network.numbers:
             return f"a network with {name}"

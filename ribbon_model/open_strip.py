@@ -1,9 +1,7 @@
-"""An open strip (or a closed, twisted one) between two ends, under loads: a variational problem from what a person says of it.
+"""An open strip (or a closed, twisted one) between two ends, under loads: a network of one member in the words of strips.
 
-The state is the quaternion of the frame and the centreline; the length is 1, and so is B (`ribbon_model.section`). The
-Hamiltonian is that of the section, H(M), plus n.d3 for the growth of the centreline, minus the potential of distributed
-loads: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), those of the centreline are the force n.
-Conditions at the ends: `ribbon_model.ends`. The reactions are the force and the moment that the supports exert on the strip.
+The length is 1, and so is B (`ribbon_model.section`); the first end is the origin, and its frame the axes. Conditions at the
+ends: `ribbon_model.ends`. The reactions are the force and the moment that the supports and dead loads exert on the strip.
 """
 
 from __future__ import annotations
@@ -12,23 +10,24 @@ import functools
 import itertools
 import math
 import warnings
-from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
-from contin import ContinError, ConvergenceError, Event, Point, ProblemError, VariationalProblem, solve
-from contin.lowlevel import Collocation, Continuation, Undetermined, shown
+from contin import ContinError, ConvergenceError, Point, ProblemError, solve
+from contin.lowlevel import Collocation, Undetermined, shown
 from ribbon_model import ends, law_end, loads
-from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End, Roller
-from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of, moment_on_axes, strains_of
+from ribbon_model.ends import ANGLES, CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End, Roller, Support
+from ribbon_model.equilibrium import CENTRELINE, FRAME
 from ribbon_model.loads import FORCES, LOADS, STROKE
-from ribbon_model.phases import PHASES
+from ribbon_model.members import FINISH, Joint, JointEnd, Load, Member
+from ribbon_model.network import Network
+from ribbon_model.phases import PHASES, Phase
 from ribbon_model.section import Section, natural_end, natural_states
-from ribbon_model.shape import Shape, shape_of
+from ribbon_model.shape import Shape
 
 #: Columns of the reactions.
 REACTIONS = tuple(
@@ -42,8 +41,7 @@ Guess = Callable[[float], list[float]]
 _STEEPEST = 2.4
 
 
-@dataclass  # the directions are normalised when it is made, and then left as they are
-class OpenStrip:
+class OpenStrip(Network):
     """A strip between two ends.
 
     Attributes
@@ -81,40 +79,40 @@ class OpenStrip:
     [(1.0, (0, 1))]
     """
 
-    section: Section
-    start: End = CLAMP
-    finish: End = CLAMP
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    weight_direction: ends.Vector = (0.0, -1.0, 0.0)
-    foundation_direction: ends.Vector = DIRECTIONS["normal"]
-    stroke_direction: ends.Vector = DIRECTIONS["tangent"]
-    phases: tuple[str, ...] = ()
-    roller: Roller | None = None
-
     __repr__ = shown
+    #: The strip is drawn straight, and its states begin with guesses.
+    assembles = False
 
-    def __post_init__(self) -> None:
-        self.weight_direction = ends.unit("weight_direction", self.weight_direction)
-        self.foundation_direction = ends.unit("foundation_direction", self.foundation_direction)
-        self.stroke_direction = ends.unit("stroke_direction", self.stroke_direction)
-        ends.check_known(self.numbers, self.known)
-        for name, value in self.numbers.items():
+    def __init__(
+        self, section: Section, start: End = CLAMP, finish: End = CLAMP, numbers: Mapping[str, float] | None = None,
+        weight_direction: ends.Vector = (0.0, -1.0, 0.0), foundation_direction: ends.Vector = DIRECTIONS["normal"],
+        stroke_direction: ends.Vector = DIRECTIONS["tangent"], phases: Sequence[str | Phase] = (), roller: Roller | None = None,
+    ) -> None:  # fmt: skip
+        numbers = dict(numbers or {})
+        self.section, self.start, self.finish = section, start, finish
+        self.stroke_direction = ends.unit("stroke_direction", stroke_direction)
+        for name, value in numbers.items():
             if not math.isfinite(value):
                 raise ValueError(f"numbers: {name} = {value:g} must be finite")
-        if self.numbers.get("foundation", 0) < 0:
-            raise ValueError(f"numbers: foundation = {self.numbers['foundation']:g} must not be negative")
-        if "moment" in self.numbers and self.finish.rotation not in (HINGED, JOINT):
+        if "moment" in numbers and finish.rotation not in (HINGED, JOINT):
             raise ValueError(
                 "numbers: moment needs a hinge or a joint at the last end, about whose axis it acts: elsewhere a dead moment "
                 "has no energy"
             )
-        if self.roller is not None and len(self.start.held) < 3:
+        if roller is not None and len(start.held) < 3:
             raise ValueError("roller: the place of the first end must be held")
-        if len(set(self.phases)) < len(self.phases):
+        if len(set(phases)) < len(phases):
             raise ValueError("phases: one of them is given twice")
-        for name in self.phases:
-            if name not in PHASES:
-                raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}")
+        origin = (0.0, 0.0, 0.0)
+        strokes = ((STROKE, self.stroke_direction),) if STROKE in numbers else ()
+        loads = {name: Load([(LAST, axis, origin)]) for name, axis in zip(FORCES, DIRECTIONS.values()) if name in numbers}
+        loads |= {"moment": Load(moments=[(LAST, 1.0)])} if "moment" in numbers else {}
+        super().__init__(
+            {"strip": section}, {"strip": Member()}, {FIRST: Joint([_START]), LAST: Joint([_FINISH])},
+            {FIRST: _support(start), LAST: _support(finish, (*PLACE, *ANGLES), origin, strokes)}, loads, numbers,
+            weight_direction, phases=phases, foundation_direction=foundation_direction, roller=roller,
+            symmetries={"plane": _mirrored},
+        )  # fmt: skip
 
     @property
     def material(self) -> Section:
@@ -134,94 +132,20 @@ class OpenStrip:
         return (*ends.numbers_of(self.finish), *roller, *stroke, *forces, *(name for name in LOADS if name not in FORCES))
 
     @functools.cached_property
-    def parameters(self) -> dict[str, float]:
-        """Names and values of all numbers that can be followed."""
-        names = ends.numbers_of(self.finish)
-        natural = {} if set(names) <= set(self.numbers) else natural_end(self.section)
-        prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
-        if self.roller is not None:
-            place = natural_states(self.section, [self.roller.at])[0, 4:] @ self.roller.direction
-            prescribed["roller"] = self.numbers.get("roller", float(place))
-        loaded = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
-        return {**prescribed, **loaded, **self.section.parameters}
+    def _usual(self) -> dict[str, float]:
+        """Place and frame of the last end, and place at a roller, of the natural state."""
+        found = {} if set(ends.numbers_of(self.finish)) <= set(self.numbers) else natural_end(self.section)
+        if self.roller is None:
+            return found
+        return found | {"roller": float(natural_states(self.section, [self.roller.at])[0, 4:] @ self.roller.direction)}
 
     # --- the problem --------------------------------------------------------------------------------------------------
 
-    @functools.cached_property
-    def problem(self) -> VariationalProblem:
-        """The variational problem.
+    def _functionals(self) -> Mapping[str, Callable]:
+        """Return the place of the last end, as far as it is free."""
+        return {name: rate for name, rate in _PLACES.items() if name not in self.parameters}
 
-        Raises
-        ------
-        ProblemError
-            Conditions that repeat or contradict each other.
-        """
-        phases = [f"phase_{name.replace(', ', '_').replace(' ', '_')}" for name in self.phases]
-        states = (*FRAME, *CENTRELINE, *phases, *(["support"] if self.roller else []))
-        return VariationalProblem(
-            None, states, self.parameters, hamiltonian=self._hamiltonian(), ends=self._conditions(),
-            end_energy=self._end_energy(), symmetries={"plane": _mirrored},
-            functionals={name: rate for name, rate in _PLACES.items() if name not in self.parameters},
-            phases=phases,
-        )  # fmt: skip
-
-    @property
-    def conditions_inside(self) -> int:
-        """Number of integral conditions: phases, and the roller, which is the last."""
-        return len(self.phases) + (self.roller is not None)
-
-    def _hamiltonian(self) -> Callable:
-        complementary = self.section.hamiltonian()
-        integrals = [*(PHASES[name] for name in self.phases), *([self.roller] if self.roller else [])]
-        potential = loads.distributed(
-            self.weight_direction if "weight" in self.numbers else None,
-            self.foundation_direction if "foundation" in self.numbers else None,
-        )
-
-        def hamiltonian(t, x, lam, p):
-            q, n1, n2, n3 = x[:4], *lam[4:7]
-            M1, M2, M3 = moment_of(q, lam[:4])
-            d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            value = complementary(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p)
-            for integral, multiplier in zip(integrals, lam[7:]):
-                value = value + multiplier * integral.density(0, t, x, p, 1)
-            return value
-
-        return hamiltonian
-
-    def _conditions(self) -> Callable:
-        clamped = self.start.rotation == CLAMPED
-        first, last = ends.rotation_conditions(self.start), ends.rotation_conditions(self.finish)
-        place, far = ends.place_conditions(self.start), ends.place_conditions(self.finish)
-        frame, count, prescribed = ends.prescribed, self.conditions_inside, self._prescribed()
-
-        def conditions(a, b, p):
-            turned, there = frame(*prescribed(p)[:3]), prescribed(p)[3:]
-            unit = a.q0 * a.q0 + a.q1 * a.q1 + a.q2 * a.q2 + a.q3 * a.q3 - 1
-            begin = (a.q0 - 1, a.q1, a.q2, a.q3) if clamped else (*first(a[:4], (1, 0, 0, 0)), unit)
-            held = (*begin, *place(a[4:7], (0, 0, 0)), *last(b[:4], turned), *far(b[4:7], there))
-            return (*held, *a[7 : 7 + count], *b[7 : 7 + count])
-
-        return conditions
-
-    def _prescribed(self) -> Callable:
-        """Return ``prescribed(p)``: turn, bend, swing, shear, rise and distance of the last end; zero where nothing is held."""
-        turned, placed = self.finish.rotation != FREE, ends.numbers_of(self.finish)
-        shear, rise, distance = (name in placed for name in PLACE)
-        moved, (x, y, z) = STROKE in self.numbers, self.stroke_direction
-
-        def prescribed(p):
-            stroke = p.stroke if moved else 0
-            return (
-                p.turn if turned else 0, p.bend if turned else 0, p.swing if turned else 0,
-                (p.shear if shear else 0) + stroke * x, (p.rise if rise else 0) + stroke * y,
-                (p.distance if distance else 0) + stroke * z,
-            )  # fmt: skip
-
-        return prescribed
-
-    def _end_energy(self) -> Callable | None:
-        return loads.at_the_end(self.numbers, self.finish, self._prescribed())
+    _sizes: ClassVar[dict[str, float]] = {}  # those of a stage are of its first state
 
     # --- first states -------------------------------------------------------------------------------------------------
 
@@ -256,11 +180,11 @@ class OpenStrip:
             a, y, z = (np.interp(t, s, column) for column in (angle, *place.T))
             return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z]
 
-        return self._with_multipliers(guess)
+        return guess
 
     def twisted(self, turn: float) -> Guess:
         """Return a guess of a straight strip that is evenly twisted."""
-        return self._with_multipliers(lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t])
+        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t]
 
     def twisted_circle(self, half_twists: float = 0) -> Guess:
         """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
@@ -270,10 +194,16 @@ class OpenStrip:
             q = ends.product((math.cos(a), math.sin(a), 0, 0), (math.cos(b), 0, 0, math.sin(b)))
             return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a)]
 
-        return self._with_multipliers(guess)
+        return guess
 
-    def _with_multipliers(self, guess: Guess) -> Guess:
-        return lambda t: [*guess(t), *[0] * self.conditions_inside]
+    def _padded(self, guess):
+        """Return a guess with zeros for integral conditions."""
+        count, more = len(FRAME) + len(CENTRELINE), [0.0] * len(self.integrals)
+        if callable(guess):
+            return lambda t: [*guess(t)[:count], *more]
+        if isinstance(guess, Point):
+            return guess
+        return guess[0], np.hstack([guess[1][:, :count], np.zeros((len(guess[0]), len(more)))])
 
     def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=None, **options) -> Point:
         """Return the state near a guess (the natural state without one), as `contin.solve` does.
@@ -286,7 +216,9 @@ class OpenStrip:
             Nothing determines the state, in one sentence; or no state was found.
         """
         if guess is None:
-            guess = self._natural_guess()
+            s = np.linspace(0, 1, 401)
+            guess = s, natural_states(self.section, s)
+        guess = self._padded(guess)
         if degree is None and not isinstance(guess, Point):
             degree = 6
         options = {"intervals": intervals, "degree": degree, **options}
@@ -298,11 +230,7 @@ class OpenStrip:
             if unloaded and isinstance(error, ConvergenceError):
                 self._check_unloaded(guess, {**(values or {}), **unloaded}, options)
             reason = self._reason(error)
-            if (
-                reason == UNHELD
-                and isinstance(guess, tuple)
-                and self._rigid_freedom(guess[1], self.parameters | (values or {}))
-            ):
+            if reason == UNHELD and isinstance(guess, tuple) and self.moves_rigidly(guess[1], self.parameters | (values or {})):
                 reason = RIGID  # round-off decides whether the solver or the index notices
             raise ProblemError(self._law_at(guess) or self._with_phases(reason, guess, values, options)) from error
         try:
@@ -326,13 +254,14 @@ class OpenStrip:
         known += ["a shift along the strip"] * (closed and self.section.homogeneous)
         if len(self.phases) > len(known):
             has = f"{known[0]} only; leave one" if known else "none; leave phases"
-            raise ProblemError(f"phases: {[*self.phases]}: each holds a continuous symmetry, and the strip has {has} out")
+            given = [name for name, phase in PHASES.items() if phase in self.phases]
+            raise ProblemError(f"phases: {given}: each holds a continuous symmetry, and the strip has {has} out")
 
     def _with_phases(self, reason: str, guess, values: Mapping[str, float] | None, options: Mapping) -> str:
         """Return the reason why nothing determines the state, with the phases that do, as few as possible: all are tried."""
         if reason not in (UNHELD, self._not_found()):
             return reason
-        others = [name for name in PHASES if name not in self.phases]
+        others = [name for name, phase in PHASES.items() if phase not in self.phases]
         for count in range(1, _MOST_PHASES - len(self.phases) + 1):
             fits = [names for names in itertools.combinations(others, count) if self._fits(names, guess, values, options)]
             if fits:
@@ -342,16 +271,14 @@ class OpenStrip:
 
     def _fits(self, names: Sequence[str], guess, values: Mapping[str, float] | None, options: Mapping) -> bool:
         """Return whether phases determine the state near a guess, and hold by symmetry: their multipliers vanish."""
-        strip = replace(self, phases=(*self.phases, *names))
-        count = len(FRAME) + len(CENTRELINE)
+        strip = OpenStrip(
+            self.section, self.start, self.finish, self.numbers, self.weight_direction, self.foundation_direction,
+            self.stroke_direction, (*self.phases, *names), self.roller,
+        )  # fmt: skip
         if isinstance(guess, Point):
             guess = guess.system.nodes, guess.system.states(guess.x)
-        if callable(guess):
-            begin = strip._with_multipliers(lambda t: guess(t)[:count])
-        else:
-            begin = guess[0], np.hstack([guess[1][:, :count], np.zeros((len(guess[0]), strip.conditions_inside))])
         try:
-            point = solve(strip.problem, begin, values, **options)
+            point = solve(strip.problem, strip._padded(guess), values, **options)
             strip.check_determined(point)
         except ContinError:
             return False
@@ -365,10 +292,6 @@ class OpenStrip:
             return law_end.at_guess(self.section, guess[0], guess[1][:, :4])
         times = np.linspace(0, 1, 401)
         return law_end.at_guess(self.section, times, np.array([guess(t)[:4] for t in times]))
-
-    def _natural_guess(self):
-        s = np.linspace(0, 1, 401)
-        return s, np.hstack([natural_states(self.section, s), np.zeros((len(s), self.conditions_inside))])
 
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
@@ -413,20 +336,7 @@ class OpenStrip:
             reason = self._reason(error)
             if reason != UNHELD:
                 raise ProblemError(reason) from error
-        raise ProblemError(RIGID if self._rigid_freedom(point.system.states(point.x), point.parameters) else UNHELD)
-
-    def _rigid_freedom(self, known: np.ndarray, values: Mapping[str, float]) -> bool:
-        """Return whether a rigid motion violates no condition at the ends of states (K, ...), in the problem's order."""
-        problem = self.problem
-        n, batch = problem.dimension, problem.batch("boundary")
-        states = np.zeros((2, len(batch.signature.states)))
-        states[:, : known.shape[1]] = known[[0, -1]]
-        p = np.array([float(values.get(name, value)) for name, value in problem.parameters.items()])
-        jacobian = batch.jacobian(np.zeros(1), states[:1], states[1:], p, batch.columns([]))[1][0]
-        count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
-        by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
-        motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
-        return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=LOOSE)) < 6
+        raise ProblemError(RIGID if self.moves_rigidly(point.system.states(point.x), point.parameters) else UNHELD)
 
     def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
         """Return the sizes of states and numbers for `contin.Settings.scales`, at a state.
@@ -442,16 +352,6 @@ class OpenStrip:
         places = [name for name in known if name not in (*forces, *self.section.parameters)]
         return dict.fromkeys(places, 1.0) | dict.fromkeys(forces, force)
 
-    # --- where the law ends -------------------------------------------------------------------------------------------
-
-    def domain_tests(self) -> list[Event]:
-        """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
-        return law_end.tests(self.section, law_end.Place(self.strains))
-
-    def explained(self, run: Continuation) -> str | None:
-        """Return that a run met the end of the law, or failed near it; None for a run that stopped elsewhere."""
-        return law_end.explained(self.section, self.domain_tests(), run)
-
     # --- what a state is ----------------------------------------------------------------------------------------------
 
     def reactions(self, point: Point) -> dict[str, float]:
@@ -459,45 +359,38 @@ class OpenStrip:
 
         With a roller or a stroke, the force of the roller and the force at the last end along the stroke follow.
         """
-        return self.reactions_of(point.system.states(point.x))
-
-    def reactions_of(self, states: np.ndarray) -> dict[str, float]:
-        """Return the same from the states (K, 2n) at the nodes."""
-        n = self.problem.dimension
-        values = []
-        roller = 0.0 if self.roller is None else float(states[0, -1])
-        before = np.zeros(3) if self.roller is None else roller * np.array(self.roller.direction)
-        for row, sign, more in ((states[-1], 1.0, 0.0), (states[0], -1.0, before)):
-            q, lam = row[:4], row[n : n + 7]
-            values += [*(sign * (lam[4:7] + more)), *(sign * moment_on_axes(q, lam[:4]))]
-        found = dict(zip(REACTIONS, map(float, values)))
+        (last, turned, _), (first, bent, _) = (self._at_end(point, end) for end in (_FINISH, _START))
+        found = {}
         if self.roller is not None:
-            found["F_roller"] = roller
+            found["F_roller"] = float(point.system.states(point.x)[0, -1])
+            first = first - found["F_roller"] * np.array(self.roller.direction)
         if STROKE in self.numbers:
-            found["F_stroke"] = float(np.dot(values[:3], self.stroke_direction))
-        return found
-
-    def potential(self, point: Point) -> float:
-        """Return the energy with the potential of the dead loads at the last end: that of which the index is."""
-        loaded = self._end_energy()
-        if loaded is None:
-            return point["energy"]
-        last = _LastEnd(*point.system.states(point.x)[-1, :7])
-        return point["energy"] + float(loaded(None, last, SimpleNamespace(**point.parameters)))
+            found["F_stroke"] = float(np.dot(last, self.stroke_direction))
+        return dict(zip(REACTIONS, map(float, (*last, *turned, *first, *bent)))) | found
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
-        return self.strains_at(system.nodes, system.states(x), system.all_parameters(x))
-
-    def strains_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return the same at places t (K,) with states (K, 2n) and the values of all parameters."""
-        return strains_of(states[:, :4], self.problem.batch("field").values(t, states, states[:0], p))
+        return super().strains(system, x)["strip"]
 
     def shape(self, point: Point) -> Shape:
         """Return the strip in space, of length 1."""
-        return shape_of(point.system.nodes, point.system.states(point.x), self.strains(point.system, point.x))
+        return self.shapes(point)["strip"]
+
+    def unbalanced(self, point: Point) -> str:
+        """Return that reactions of a state are replaced by nothing, if the ends are held otherwise."""
+        carried = list(self.reactions(point).values())
+        reactions = [", ".join(f"{value:.4g}" for value in carried[i : i + 3]) for i in range(0, 12, 3)]
+        return (
+            "they let go of what no load replaces; along width, normal and tangent the last end carries the force "
+            f"({reactions[0]}) and the moment ({reactions[1]}), the first one ({reactions[2]}) and ({reactions[3]}); "
+            "a dead force replaces that at the last end, a dead moment the one about the axis of its hinge: bring the others "
+            "to zero first"
+        )
 
 
+#: The joints of a strip, and its ends there.
+FIRST, LAST = "first", "last"
+_START, _FINISH = JointEnd("strip"), JointEnd("strip", FINISH)
 #: Why a state is not determined.
 RIGID = "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
 UNHELD = (
@@ -510,8 +403,6 @@ UNDETERMINED = (
     "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
     "softness, or hold less"
 )
-#: States of the last end, as the potential of its loads takes them.
-_LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
 
@@ -523,15 +414,9 @@ def _mirrored(t, x):
     return x * signs
 
 
-def _moved(state, k: int, n: int) -> np.ndarray:
-    """Return the change of a state by a rigid translation (k < 3) or rotation about the origin, padded to n."""
-    change, axis = np.zeros(n), np.eye(3)[k % 3]
-    if k < 3:
-        change[4:7] = axis
-    else:
-        change[:4] = ends.product((0, *axis / 2), state[:4])
-        change[4:7] = np.cross(axis, state[4:7])
-    return change
+def _support(end: End, *prescribed) -> Support:
+    """Return an end as the support of a joint; ``prescribed`` are the further fields."""
+    return Support(end.rotation, end.axis, end.director, end.held, *prescribed)
 
 
 def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:

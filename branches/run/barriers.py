@@ -21,16 +21,13 @@ from branches.store.open_branch import OpenBranch
 from contin import ContinError, Point
 from contin.lowlevel import exact_text, levels
 from ribbon_model.barriers import KICK_OPEN, SEGMENTS, Barrier, apart, at_rest, barriers, ways_down
-from ribbon_model.changed_ends import corrected
+from ribbon_model.changed_supports import corrected
 from ribbon_model.descent import LONGEST, descend, past
 from ribbon_model.equilibrium import CENTRELINE
+from ribbon_model.network_segments import NetworkChain, cut, unsupported
 
 if TYPE_CHECKING:
     from branches.scene.open_stage import OpenStage
-    from ribbon_model.network_segments import NetworkChain
-    from ribbon_model.open_segments import OpenChain
-
-    Chain = OpenChain | NetworkChain
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +40,9 @@ class State:
     index: int
     potential: float
 
-    def chain(self, segments: int) -> Chain:
+    def chain(self, segments: int) -> NetworkChain:
         """Return the state cut into segments."""
-        return self.stage.chains.cut(self.stage.strip, self.point.system, self.point.x, segments)
+        return cut(self.stage.strip, self.point.system, self.point.x, segments)
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
             column = branch.followed(stage)
             place = Place(row, stage, column, float(branch.points[column][row]), states_at(branch, row), {})
             mechanics = branch.stages[stage - 1]
-            if {0, 1} <= {state.index for state in place.states} and not mechanics.chains.unsupported(mechanics.strip):
+            if {0, 1} <= {state.index for state in place.states} and not unsupported(mechanics.strip):
                 place.ways.update(_ways(place.states))
                 found.append(place)
     return found
@@ -162,7 +159,7 @@ def _ways(states: Sequence[State]) -> dict[str, Barrier]:
     return barriers([(state.name, state.potential) for state in stable], found)
 
 
-def _name(end: Chain, stable: Sequence[State]) -> str | None:
+def _name(end: NetworkChain, stable: Sequence[State]) -> str | None:
     """Return the name of the stable state in which a strip rests, or of one that it is an image of; None for another one."""
     rests = []
     for state in stable:
@@ -208,13 +205,13 @@ def falls(branch: OpenBranch, quiet: bool = True) -> list[Fall]:
 
 def _fall(branch: OpenBranch, row: int) -> Fall | None:
     stage = branch.stages[int(branch.points["stage"][row]) - 1]
-    if row not in branch.kept() or stage.chains.unsupported(stage.strip):
+    if row not in branch.kept() or unsupported(stage.strip):
         return None
     column, length = stage.follow, branch.scene.longest
     limit, before = (float(branch.points[column][at]) for at in (row, row - 1))
     value = past(limit, 1 if before < limit else -1)
     try:
-        chain = stage.chains.cut(stage.strip, *branch.discretized(row), SEGMENTS)
+        chain = cut(stage.strip, *branch.discretized(row), SEGMENTS)
         chain = replace(chain, numbers={**chain.numbers, column: value}).moved(np.zeros(chain.size))
         end = at_rest(chain, KICK_OPEN / length, LONGEST / length)
     except ValueError:  # it cannot be held past the fold, or be cut into so few segments

@@ -113,12 +113,6 @@ class NetworkStage(OpenStage):
                 found |= zip((f"{kind}_{joint}_{axis}" for axis in _AXES), map(float, part))
         return found
 
-    @property
-    def chains(self):
-        from ribbon_model import network_segments
-
-        return network_segments
-
     # --- words ----------------------------------------------------------------------------------------------------------
 
     @property

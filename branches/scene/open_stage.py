@@ -16,9 +16,9 @@ from branches.scene.open_strip import OpenScene, StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
-from ribbon_model.changed_ends import with_ends
+from ribbon_model.changed_supports import with_supports
 from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
-from ribbon_model.loads import STROKE
+from ribbon_model.loads import REPLACING, STROKE
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
 #: Words of the columns, and those of axes. Lengths are over that of the strip, unless the scene has dimensions.
@@ -114,7 +114,8 @@ class OpenStage(Stage):
 
     def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
         """Return the system of this stage and the unknowns of a state of another one, with other numbers."""
-        return with_ends(self.strip, origin, self.follow, numbers)
+        replacing = [name for name in REPLACING if name in self.strip.numbers]
+        return with_supports(self.strip, origin, self.follow, replacing, numbers)
 
     def mesh_control(self) -> MeshControl:
         """Return how the mesh adapts."""
@@ -324,13 +325,6 @@ class OpenStage(Stage):
     def found(self, point: Point) -> dict[str, float]:
         """Return the potential and the reactions."""
         return {"potential": self.strip.potential(point), **self.strip.reactions(point)}
-
-    @property
-    def chains(self):
-        """The module that cuts states into segments, for descents: ``unsupported(strip)`` and ``cut(strip, system, x, N)``."""
-        from ribbon_model import open_segments  # most runs cut nothing
-
-        return open_segments
 
     # --- words ----------------------------------------------------------------------------------------------------------
 

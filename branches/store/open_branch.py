@@ -15,7 +15,7 @@ from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
 from contin.lowlevel import PALETTE, Collocation, levels
-from ribbon_model.changed_ends import fitted
+from ribbon_model.changed_supports import fitted
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip

@@ -1,56 +1,18 @@
-"""Open strips of segments: exact derivatives, the index of the continuous strip, and what lies beside a saddle."""
-
-from dataclasses import replace
+"""Open strips of segments: energies of laws, the index of the continuous strip, and what lies beside a saddle."""
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import contin
 from ribbon_model.barriers import KICK_OPEN, apart, ways_down
-from ribbon_model.changed_ends import with_ends
+from ribbon_model.changed_supports import with_supports
 from ribbon_model.descent import descend, modes
-from ribbon_model.ends import ANGLES, BALL, CLAMP, FREE_END, PLACE, End, angles_of, hinge
-from ribbon_model.open_segments import OpenChain, cut, unsupported
+from ribbon_model.ends import BALL, CLAMP, End, Roller, hinge
+from ribbon_model.network_segments import cut, unsupported
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.section import section_of
 
 ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8, "kappa_n": 0.5})
-LOADS = {"force_width": 1.3, "force_normal": -0.4, "force_tangent": 0.7, "weight": 2.0, "foundation": 3.0}
-STRIPS = {
-    "clamped": OpenStrip(ROD, numbers={"weight": 2.0}), "free": OpenStrip(ROD, finish=FREE_END, numbers=LOADS),
-    "hinged": OpenStrip(ROD, hinge("normal"), BALL, {"weight": 2.0, "foundation": 3.0}), "ball": OpenStrip(ROD, BALL, CLAMP),
-}  # fmt: skip
-
-
-def held_where_it_is(strip, segments):
-    """A strip of random strains, with prescribed numbers that fit it."""
-    strains = np.random.default_rng(0).normal(size=(segments, 3))
-    chain = OpenChain(strip, strip.parameters, strains, np.eye(3))
-    x, y, z, w = Rotation.from_matrix(chain.axes[-1]).as_quat()
-    here = dict(zip(ANGLES, angles_of((w, x, y, z)))) | dict(zip(PLACE, chain.centreline[-1]))
-    return replace(chain, numbers={name: here.get(name, value) for name, value in strip.parameters.items()})
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    "ends", ["clamped", "free", *(pytest.param(name, marks=pytest.mark.full) for name in ("hinged", "ball"))]
-)
-def test_derivatives_against_differences(ends):
-    """Of the energy and of the conditions with their multipliers; the differences are good to 1e-8 and 1e-7 of the largest."""
-    chain, h = held_where_it_is(STRIPS[ends], 5), 1e-4
-    gradient, slopes, hessian, multipliers = chain.linearized()
-    unit = h * np.eye(chain.size)
-
-    def lagrangian(change):
-        moved = chain._changed(change)
-        return 5 * moved.energy + multipliers @ moved.closure
-
-    first = [(lagrangian(a) - lagrangian(-a)) / (2 * h) for a in unit]
-    np.testing.assert_allclose(first, gradient + multipliers @ slopes, atol=1e-7 * np.abs(gradient).max())
-    pairs = [[(lagrangian(a + b), lagrangian(a - b), lagrangian(b - a), lagrangian(-a - b)) for a in unit] for b in unit]
-    second = np.array(pairs) @ [1, -1, -1, 1] / (4 * h * h)
-    np.testing.assert_allclose(second, hessian, atol=1e-6 * np.abs(hessian).max())
 
 
 @pytest.mark.sample(4)
@@ -120,7 +82,7 @@ def test_both_sides_of_the_saddle_between_two_arches():
     straight = contin.trace(column.first_point(), free=["force_tangent"], limits={"force_tangent": (-90, -60)}, direction=-1)
     (start, *_) = straight.labelled("BP")
     mode = contin.trace(start, branch=1, zeros={"distance": [0.9]}, limits={"distance": (0.85, 1.1)})
-    system, x = with_ends(strip, mode.labelled("UZ")[0], "distance")
+    system, x = with_supports(strip, mode.labelled("UZ")[0], "distance", [])
     saddle = contin.lowlevel.point_of(system, x)
     assert saddle.second_variation().index() == 1
     found = ways_down(lambda segments: cut(strip, saddle.system, saddle.x, segments), apart, KICK_OPEN)
@@ -130,7 +92,7 @@ def test_both_sides_of_the_saddle_between_two_arches():
 
 
 def test_what_is_not_cut_into_segments():
-    assert unsupported(STRIPS["hinged"]) == ""
+    assert unsupported(OpenStrip(ROD, hinge("normal"), BALL, {"weight": 2.0, "foundation": 3.0})) == ""
     assert "phases" in unsupported(OpenStrip(ROD, phases=("spin",)))
-    with pytest.raises(ValueError, match="a strip whose first end can move is not cut into segments"):
-        cut(OpenStrip(ROD, FREE_END, CLAMP), None, None, 10)
+    with pytest.raises(ValueError, match="a strip with a roller is not cut into segments"):
+        cut(OpenStrip(ROD, roller=Roller(0.5, (0, 1, 0))), None, None, 10)

@@ -24,7 +24,7 @@ from ribbon_model.domains import HALF_LOOP
 from ribbon_model.ends import DIRECTIONS, FREE_END, HINGED, End
 from ribbon_model.law import Law, Parameter
 from ribbon_model.linear import circle, convex_limits, covering, energy_interval, index, stability_interval, thresholds
-from ribbon_model.open_segments import cut
+from ribbon_model.network_segments import cut
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.second_variation import circle as equilibrium_of_circle
 from ribbon_model.section import Section

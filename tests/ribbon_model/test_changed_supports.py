@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import contin
-from ribbon_model.changed_ends import angles_near, with_ends
+from ribbon_model.changed_supports import angles_near, with_supports
 from ribbon_model.ends import BALL, CLAMP, DIRECTIONS, End, hinge, prescribed
-from ribbon_model.loads import replacing_loads
+from ribbon_model.loads import REPLACING, replacing_loads
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.section import section_of
 
@@ -18,6 +18,10 @@ ROD = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
 
 def released(before, finish):
     return OpenStrip(before.section, before.start, finish, dict.fromkeys(replacing_loads(finish), 0.0))
+
+
+def with_ends(strip, point, follow):
+    return with_supports(strip, point, follow, [name for name in REPLACING if name in strip.numbers])
 
 
 def continued(strip, point, follow):
