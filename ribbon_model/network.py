@@ -20,6 +20,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import re
 from collections import Counter, namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -44,6 +45,8 @@ __all__ = ["BALL", "FINISH", "HINGE", "RIGID", "START", "Joint", "JointEnd", "Lo
 #: The number that leads from the drawing, which is free of stress at 0, to the network at 1: natural strains, loads, and gaps
 #: and turns of joints are this part of theirs. A drawing that needs none of this has no such number.
 ASSEMBLY = "assembly"
+#: Axes of the drawing.
+AXES = "xyz"
 #: Displacements of a joint along the axes of the drawing, behind its name.
 MOVES = ("dx", "dy", "dz")
 #: Numbers of loads that act all along.
@@ -280,6 +283,10 @@ class Network:
     def full_name(self, section: str, number: str) -> str:
         """Return the name of a number of a section among all."""
         return number if len(self.sections) == 1 else f"{number}_{section}"
+
+    def numbers_of(self, section: str, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the numbers of a section by their own names, from the values of all."""
+        return {name: values[self.full_name(section, name)] for name in self.sections[section].parameters}
 
     def said(self, each: JointEnd) -> str:
         """Return an end in the words of a scene: 'beam start', and 'beam at 0.5' for one of the pieces 'beam 1', 'beam 2'."""
@@ -962,6 +969,32 @@ class Network:
         name = self.joint_at(first)
         return {"floating": self._reaction(point, self.joints[name].members if name else [first], name)}
 
+    @property
+    def found_names(self) -> tuple[str, ...]:
+        """Names of what `found` gives."""
+        places = [f"{column(joint)}_{axis}" for joint in self.joints for axis in AXES]
+        reactions = [f"{kind}_{joint}_{axis}" for joint in self.held for kind in "FM" for axis in AXES]
+        return (*places, *reactions, *(["floating"] if self.floats else []))
+
+    def found(self, point: Point) -> dict[str, float]:
+        """Return places of joints and reactions by name; of a network that floats, the largest part of its reactions."""
+        places = [self.place(point, joint) for joint in self.joints]
+        reactions = [part for parts in self.reactions(point).values() for part in parts]
+        last = [np.abs(reactions).max()] if self.floats else np.ravel(reactions)
+        return dict(zip(self.found_names, map(float, (*np.ravel(places), *last))))
+
+    def conjugate(self, name: str) -> str:
+        """Return the name of what is conjugate to a number, up to a sign and a factor: the energy for many."""
+        if forces := [*self.loads[name].forces, *self.loads[name].followers] if name in self.loads else ():
+            joint, direction, _ = forces[0]
+            return f"{column(joint)}_{AXES[int(np.argmax(np.abs(direction)))]}"
+        joint, _, move = name.rpartition("_")
+        return f"F_{joint}_{move[1]}" if move in MOVES and joint in self.held else "energy"
+
+    def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
+        """Return the sizes of states and numbers for `contin.Settings.scales`, at a state: the problem has its own."""
+        return {}
+
     def _reaction(self, point: Point, those: Sequence[JointEnd], name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force and moment on ends that meet, about their place, less the loads at the joint of this name."""
         force, moment, first, numbers = np.zeros(3), np.zeros(3), those[0], SimpleNamespace(**point.parameters)
@@ -1035,6 +1068,11 @@ class Network:
         states, rows = point.system.states(point.x), namedtuple("State", (*FRAME, *CENTRELINE))
         first, last = ([rows(*states[end, places[:7]]) for places in self.places] for end in (0, -1))
         return point["energy"] + float(self._end_energy(first, last, SimpleNamespace(**point.parameters)))
+
+
+def column(joint: str) -> str:
+    """Return the name of a joint in columns: that of 'beam at 0.5' is beam_at_0_5."""
+    return re.sub(r"\W+", "_", joint)
 
 
 def _unit(x):

@@ -197,7 +197,11 @@ class NetworkChain:
         for member, piece in zip(self.network.members.values(), self.pieces):
             section = self.network.sections[member.section]
             t = (np.arange(len(piece.strains)) + 0.5) / len(piece.strains)
-            found.append(section.strain_energy(t, piece.strains, _numbers(self.network, member.section, self.numbers)))
+            found.append(
+                section.strain_energy(
+                    t, piece.strains, SimpleNamespace(**self.network.numbers_of(member.section, self.numbers))
+                )
+            )
         return found
 
     @cached_property
@@ -448,12 +452,6 @@ class _Acting:
         self.moments[end.piece, int(end.last)] += moment
 
 
-def _numbers(network: Network, section: str, numbers: Mapping[str, float]) -> SimpleNamespace:
-    """Return the numbers of a section by their own names."""
-    own = network.sections[section].parameters
-    return SimpleNamespace(**{name: numbers[network.full_name(section, name)] for name in own})
-
-
 def _vector(rotation: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(rotation).as_rotvec()
 
@@ -499,7 +497,7 @@ def cut(network: Network, system: Collocation, x: np.ndarray, segments: int) -> 
         middle = (np.arange(count) + 0.5) / count
         strains = network.strains_at(middle, system.evaluate(x, middle), p)[name]
         section, own = network.sections[member.section], first[places[:7]]
-        rigid = section.constrained and not getattr(_numbers(network, member.section, numbers), "softness", 0.0) > 0
+        rigid = section.constrained and not network.numbers_of(member.section, numbers).get("softness", 0.0) > 0
         pieces.append(Piece(member.length, strains, frames(own[None])[0].T, own[4:], (0, 2) if rigid else (0, 1, 2)))
     chain = NetworkChain(network, numbers, tuple(pieces), segments)
     return chain.moved(np.zeros(chain.size))

@@ -33,6 +33,12 @@ from ribbon_model.shape import Shape
 REACTIONS = tuple(
     f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
 )  # fmt: skip
+#: What a person feels or sees where a number is followed.
+_CONJUGATE = {
+    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
+    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
+    "weight": "rise", "roller": "F_roller", "stroke": "F_stroke",
+}  # fmt: skip
 #: Most phases of a strip: it can shift and turn about itself.
 _MOST_PHASES = 2
 #: A first guess: a function of the arclength that returns quaternion and centreline, seven numbers.
@@ -367,6 +373,18 @@ class OpenStrip(Network):
         if STROKE in self.numbers:
             found["F_stroke"] = float(np.dot(last, self.stroke_direction))
         return dict(zip(REACTIONS, map(float, (*last, *turned, *first, *bent)))) | found
+
+    @property
+    def found_names(self) -> tuple[str, ...]:
+        """Names of the reactions."""
+        more = [("F_roller", self.roller is not None), ("F_stroke", STROKE in self.numbers)]
+        return (*REACTIONS, *(name for name, has in more if has))
+
+    found = reactions
+
+    def conjugate(self, name: str) -> str:
+        """Return the name of what is conjugate to a number, up to a sign: the energy for numbers of the section."""
+        return _CONJUGATE.get(name, "energy")
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""

@@ -14,9 +14,9 @@ from types import ModuleType
 from branches.graph import closed, open_strips
 from branches.scene.fields import Scene
 from branches.scene.sweep import Sweep
-from branches.store.layout import CLOSED, NETWORK, OPEN
+from branches.store.layout import CLOSED
 
 
 def graph_kind(scene: Scene | Sweep) -> ModuleType:
     """Return the kind of diagram that results of a scene make."""
-    return {CLOSED: closed, OPEN: open_strips, NETWORK: open_strips}[next(iter(scene.scenes.values())).KIND]
+    return closed if next(iter(scene.scenes.values())).KIND == CLOSED else open_strips

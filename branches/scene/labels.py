@@ -48,13 +48,6 @@ LABELS = {
     "EP": Label("end", "end", "o", END, 45),
     "MX": Label("end", "lost", "x", END, 40),
 }
-#: What a person feels or sees where a number of an open strip is followed: its conjugate, up to a sign. Others are shown with
-#: the energy.
-CONJUGATE = {
-    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
-    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
-    "weight": "rise", "roller": "F_roller", "stroke": "F_stroke",
-}  # fmt: skip
 #: The name of the first point of a run.
 START = "start"
 #: The name of an end on a circle.

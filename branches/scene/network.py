@@ -18,13 +18,13 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.columns import OWN
-from branches.scene.fields import StepConfig, Strict
+from branches.scene.fields import ConfigError, StepConfig, Strict
 from branches.scene.open_strip import Axis, EndWords, FollowConfig, OpenMesh, OwnDirection, StagedScene, finite, numbers_of
 from ribbon_model.changed_supports import replacing
 from ribbon_model.ends import DIRECTIONS, FREE_END, LOOSE, End
 from ribbon_model.equilibrium import directors
 from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, frame_along, straight
-from ribbon_model.network import FOLLOWER, POTENTIALS, Network
+from ribbon_model.network import FOLLOWER, POTENTIALS, Network, column
 from ribbon_model.section import Section, section_of
 
 #: An end of a strip, or a place along it, in words.
@@ -147,6 +147,8 @@ class NetworkScene(StagedScene):
     )  # fmt: skip
 
     dimensions: ClassVar[None] = None
+    SUPPORTS: ClassVar[str] = "held"
+    units: ClassVar[str] = "the units of the scene"
 
     title: str = ""
     material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
@@ -249,14 +251,21 @@ class NetworkScene(StagedScene):
             for field, word in words.items():
                 yield f"{where}: {field}: {word} is the direction ({', '.join(f'{x:.6g}' for x in self.axes_at(name)[word])})"
 
-    @functools.cached_property
-    def found_names(self) -> tuple[str, ...]:
-        """The columns of what is found in states."""
-        networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
-        places = [f"{column(joint)}_{axis}" for joint in networks[0].joints for axis in "xyz"]
-        held = dict.fromkeys(joint for network in networks for joint in network.held)
-        reactions = [f"{kind}_{joint}_{axis}" for joint in held for kind in "FM" for axis in "xyz"]
-        return ("potential", *places, *reactions, *(["floating"] if any(network.floats for network in networks) else []))
+    def column_words(self, name: str) -> tuple[str, str]:
+        """Return the words of a column, and those of its axis."""
+        from branches.scene.words import of_networks
+
+        return of_networks(self.strip(), self.loads, name)
+
+    def first(self, grows: Mapping[str, float], options: dict[str, Any]) -> tuple[Any, str]:
+        """As `StagedScene.first`; what a floating network is turned by is small, where it ``grows`` from zero."""
+        from contin import ContinError
+        from ribbon_model.network_first import first_state
+
+        try:
+            return first_state(self.strip(), self.mesh.intervals, grows=grows, **options)
+        except (ContinError, ValueError) as error:
+            raise ConfigError(f"strips: no first state was found from the drawing: {error}") from error
 
     def replacing(self, stage: int) -> tuple[str, ...]:
         """Return the names of the loads that replace reactions in a stage."""
@@ -380,11 +389,6 @@ class NetworkScene(StagedScene):
         """The network in words."""
         count, joints = len(self.strips), len(self.joints)
         return f"{count} strip{'s' * (count != 1)} ({self.law_name}), {joints} joint{'s' * (joints != 1)}"
-
-
-def column(joint: str) -> str:
-    """Return the name of a joint in columns: that of 'beam at 0.5' is beam_at_0_5."""
-    return re.sub(r"\W+", "_", joint)
 
 
 def _parsed(where: str, place: str, names) -> tuple[str, str | None, float | None]:

@@ -1,72 +1,32 @@
-"""A stage of an open strip: from a labelled point of an earlier one, by default its end, to a value of the followed number."""
+"""A stage of an open strip or a network: from a labelled point of an earlier one to a value of the followed number."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns, error_of
 from branches.scene.fields import ConfigError
-from branches.scene.labels import CONJUGATE, label_of, without_round_off
-from branches.scene.open_strip import OpenScene, StagedScene
+from branches.scene.labels import label_of, without_round_off
+from branches.scene.open_strip import StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
-from ribbon_model.changed_supports import with_supports
-from ribbon_model.ends import ANGLES, DIRECTIONS, angles_of
-from ribbon_model.loads import REPLACING, STROKE
-from ribbon_model.open_strip import REACTIONS, OpenStrip
+from ribbon_model.changed_supports import held_at, with_supports
 
-#: Words of the columns, and those of axes. Lengths are over that of the strip, unless the scene has dimensions.
-_WORDS = {
-    "distance": ("place of the last end along the tangent of the first one", "distance of the ends"),
-    "rise": ("place of the last end along the normal of the first one", "displacement along the normal"),
-    "shear": ("place of the last end along the width of the first one", "displacement along the width"),
-    "turn": ("angle of the last end about the tangent of the first one", "turn of the end"),
-    "bend": ("angle of the last end about the width of the first one", "bend of the end"),
-    "swing": ("angle of the last end about the normal of the first one", "swing of the end"),
-    "stroke": ("further displacement of the last end", "displacement of the end"),
-    "roller": ("place of the strip at the roller, along the direction in which it holds", "place at the roller"),
-    "force_width": ("dead force at the last end along the width", "force along the width"),
-    "force_normal": ("dead force at the last end along the normal", "force along the normal"),
-    "force_tangent": ("dead force at the last end along the tangent; negative compresses", "force along the tangent"),
-    "moment": ("dead moment about the hinge of the last end", "moment at the hinge"),
-    "weight": ("weight per length", "weight per length"),
-    "foundation": ("stiffness per length of the foundation", "stiffness of the foundation"),
-    "kappa_n": ("natural curvature about the width", "natural curvature"),
-    "kappa_2": ("natural curvature about the normal", "natural curvature in the plane"),
-    "tau_n": ("natural twist", "natural twist"),
-    "D11": ("bending stiffness of the plate along the strip, times the width", "bending stiffness along"),
-    "D12": ("coupling of the bendings along and across the strip", "coupling of bendings"),
-    "D22": ("bending stiffness across the strip", "bending stiffness across"),
-    "D66": ("twisting stiffness", "twisting stiffness"),
-    "nu": ("Poisson's ratio", "Poisson's ratio"),
-    "Gamma": ("w^2/(h L) of the law finite width", "Γ"),
-    "softness": ("compliance about the normal", "softness in the plane"),
-    "energy": ("elastic energy, zero in the natural state, and potential of weight and foundation", "energy"),
-    "potential": ("energy and the potential of dead loads at the last end: the one of which the index is", "potential"),
-    "F_roller": ("force of the roller on the strip", "force of the roller"),
-    "F_stroke": ("force on the strip at its last end, along the direction of the stroke", "force along the stroke"),
-}  # fmt: skip
-_WORDS |= {
-    f"{start}{kind}_{along}": (
-        f"{what} on the strip at its {end} end, along the {along} of the first one",
-        f"{what} {'along' if kind == 'F' else 'about'} the {along}{' at the first end' if start else ''}",
-    )
-    for start, end in (("", "last"), ("start_", "first"))
-    for kind, what in (("F", "force"), ("M", "moment"))
-    for along in DIRECTIONS
-}
+if TYPE_CHECKING:
+    from ribbon_model.network import Network
 
 
 class SymmetriesWatch(Watch):
     """Index and broken symmetries of points, as contin found them."""
 
-    def __init__(self, strip: OpenStrip):
+    def __init__(self, strip: Network):
         self._symmetries = strip.problem.symmetries
 
     def index(self, point: Point) -> int:
@@ -81,25 +41,20 @@ class SymmetriesWatch(Watch):
 
 
 class OpenStage(Stage):
-    """A stage of an open scene."""
+    """A stage of a scene of an open strip or a network."""
 
     starts_others = has_barriers = True
-    #: Fields that say what is held.
-    supports = "start, finish"
 
-    def __init__(self, scene: OpenScene, number: int):
+    def __init__(self, scene: StagedScene, number: int):
         self.scene, self.number, self.stage, self.strip = scene, number, scene.stages[number - 1], scene.strip(number)
         self.follow, self.problem = self.stage.follow, self.strip.problem
         self.free, self.watch = (self.follow, *self.problem.multipliers), SymmetriesWatch(scene.strip())
-        felt = self.felt(self.follow)
+        felt = self.strip.conjugate(self.follow)
         self.conjugate = felt if felt in self.columns().all else "energy"
-        sizes = scene.dimensions
-        length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
-        modulus = "1" if sizes is None else f"1 ({scene.modulus:.12g} N m^2)"
-        self.units = f"bending modulus B = {modulus}, length L = {length}"
-        unit = scene.unit(self.follow)
+        self._beside, self.units, unit = scene.BESIDE or self.conjugate, scene.units, scene.unit(self.follow)
         self.title = f"stage {number}: {self.follow}{f' in {unit}' if unit else ''}\n"
-        self.head = f"{self.follow:>14s}     energy      F_tangent      index   N  it"
+        self.head = f"{self.follow:>14s}     energy      {self._beside:>9s}      index   N  it"
+        self._how = ""
         self._largest = abs(self.stage.to)
         self._missed: list[str] = []
 
@@ -110,16 +65,19 @@ class OpenStage(Stage):
 
     def first(self) -> Point:
         """Return the state from which the first stage starts; raise ConfigError where there is none."""
-        return first_state(self.scene)
+        options = {"degree": self.scene.mesh.degree, "mesh": self.mesh_control(), "newton": newton_of(self.scene)}
+        point, self._how = self.scene.first({self.follow: self.stage.to}, options)
+        return point
 
     def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
         """Return the system of this stage and the unknowns of a state of another one, with other numbers."""
-        replacing = [name for name in REPLACING if name in self.strip.numbers]
-        return with_supports(self.strip, origin, self.follow, replacing, numbers)
+        return with_supports(self.strip, origin, self.follow, self.scene.replacing(self.number), numbers)
 
     def mesh_control(self) -> MeshControl:
-        """Return how the mesh adapts."""
-        return _mesh_control(self.scene)
+        """Return how the mesh adapts; a mesh point stays at a roller."""
+        mesh = self.scene.mesh
+        every = mesh.adapt_every if self.strip.roller is None else 0
+        return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, every)
 
     def resume(self, state: State, first: tuple[Collocation, np.ndarray, np.ndarray], earlier) -> Continuation:
         settings = self.start(earlier).settings  # those of the stage's start, to the last bit
@@ -151,7 +109,14 @@ class OpenStage(Stage):
 
     def notes(self, run: Continuation) -> list[str]:
         units = " (numbers in units of L and B)" if self.scene.dimensions is not None else ""
-        return [f"stage {self.number}: {note}{units}" for note in run.notes] + self._missed
+        notes = [f"the first state was found {self._how}"] if self._how else []
+        if self._how:
+            gaps = self.strip.gaps.items()
+            notes += [f"the drawing has a gap of {gap:.4g} at {name}, which was closed" for name, gap in gaps]
+        notes = [f"stage {self.number}: {note}" for note in (*notes, *self.scene.told_axes(self.number))]
+        if self.number == 1 and not self.problem.has_index:
+            notes.append("loads that follow the strips have no energy: there is no index, and flutter is not looked for")
+        return notes + [f"stage {self.number}: {note}{units}" for note in run.notes] + self._missed
 
     def _came_back(self, run: Continuation, last: Point) -> list[str]:
         """Return a note if the stage turned back at a fold, and ended on the other side of its start."""
@@ -215,7 +180,14 @@ class OpenStage(Stage):
 
     def _begun(self, origin: Point) -> Continuation:
         """Return the run of a stage from a point."""
-        stage, strip = self.stage, self.strip
+        stage, strip, waves = self.stage, self.strip, getattr(self.stage, "phase", None)
+        if waves is not None and origin.system.problem is not self.problem:
+            try:
+                origin = strip.restated(origin)
+            except ContinError as error:
+                raise ConfigError(
+                    f"phase: with {waves} waves held, no single branch leaves; try another number of waves"
+                ) from error
         changed = origin.system.problem is not strip.problem or bool(stage.numbers)
         if stage.start_at is not None and stage.start_at.startswith(Label.BRANCH_POINT):
             return Continuation(origin.system, origin.x, *self._switched(origin, changed))
@@ -227,7 +199,7 @@ class OpenStage(Stage):
             system, x = self.restated(origin, numbers)
             return Continuation(system, x, self._settings(system, x))
         except ValueError as error:
-            raise ConfigError(f"{self.supports}: {error}") from error
+            raise ConfigError(f"{self.scene.SUPPORTS}: {error}") from error
         except ConvergenceError as error:
             given = ", ".join(f"{name} = {exact_text(value)}" for name, value in stage.numbers.items())
             where = f"near the one before{f' with {given}' if given else ' with these ends'}"
@@ -261,10 +233,6 @@ class OpenStage(Stage):
         settings = dataclasses.replace(self._settings(origin.system, origin.x), direction=way)
         return settings, way * origin.details.tangents[1]
 
-    def sizes(self, system: Collocation, x: np.ndarray) -> Mapping[str, float]:
-        """Return the sizes of states and numbers where the stage starts."""
-        return self.strip.sizes(system, x)
-
     def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
         """Return the settings of a stage that starts at a state."""
         stage, steps = self.stage, self.scene.steps
@@ -278,7 +246,7 @@ class OpenStage(Stage):
             primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
             max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
             zeros=zeros, mesh=self.mesh_control(), newton=newton_of(self.scene), events=self.strip.domain_tests(),
-            scales=self.sizes(system, x),
+            scales=self.strip.sizes(system, x),
         )  # fmt: skip
 
     # --- columns --------------------------------------------------------------------------------------------------------
@@ -294,67 +262,45 @@ class OpenStage(Stage):
         columns = [self._column(name, error_of(name) if name in followed else None) for name in numbers]
         columns += [self._column(name, error_of(name), role=FOUND) for name in found]
         columns.append(Column("stage", "stage of the scene, from 1", lambda row: row.stage.number, None, "i4", BOOK))
-        return Columns(
-            (*columns, *(self._column(name, error_of(name), role=FOUND) for name in self.found_names(numbers))), True
-        )
-
-    def words(self, name: str) -> tuple[str, str]:
-        """Return the words of a column, and those of its axis."""
-        return _WORDS.get(name, (name, name))
+        return Columns((*columns, *(self._column(name, error_of(name), role=FOUND) for name in self.scene.found_names)), True)
 
     def _column(self, name: str, error, role: str = NUMBER) -> Column:
-        words, axis = self.words(name)
+        words, axis = self.scene.column_words(name)
         return Column(name, words, error=error, role=role, axis=axis)
 
-    def found_names(self, numbers: Collection[str]) -> tuple[str, ...]:
-        """Return the names of what is found in states, besides functionals; ``numbers`` are those of all stages."""
-        roller, stroke = ("F_roller",) if self.scene.roller else (), ("F_stroke",) if STROKE in numbers else ()
-        return ("potential", *REACTIONS, *roller, *stroke)
-
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:
-        """Loads that do not act are zero; angles that are not prescribed are those of the last end."""
+        """Loads and reactions that do not act are zero; displacements and rotations that are not prescribed are those found."""
         found = {**point.parameters, **point.functionals, **self.found(point)}
         absent = {name: 0.0 for name in names if name not in found}
-        if set(ANGLES) & set(absent):
-            absent |= dict(zip(ANGLES, angles_of(point.system.states(point.x)[-1, :4])))
+        for joint in self.strip.joints:
+            if any(name in absent for name in self.strip.names_at(joint)):
+                absent |= held_at(self.strip, point, joint)
         return absent | found
 
     def errors(self, point: Point) -> Mapping[str, float]:
         return errors_of(point, lambda at: {**at.functionals, **self.found(at)}) | point.errors
 
     def found(self, point: Point) -> dict[str, float]:
-        """Return the potential and the reactions."""
-        return {"potential": self.strip.potential(point), **self.strip.reactions(point)}
+        """Return the potential, and what the mechanics find: places of joints, reactions."""
+        return {"potential": self.strip.potential(point), **self.strip.found(point)}
 
     # --- words ----------------------------------------------------------------------------------------------------------
 
     def row(self, point: Point, step: float) -> str:
-        factor = self.scene.factor
+        factor, told = self.scene.factor, {"energy": point["energy"], **point.functionals, **self.found(point)}
+        stiffness = min(section.stiffness for section in self.strip.sections.values())  # what round-off is compared with
         self._largest = max(self._largest, abs(point[self.follow] * factor(self.follow)))
-        force, energy = (without_round_off(found, self.stiffness) * factor(name) for name, found in self.told_values(point))
+        force, energy = (without_round_off(told[name], stiffness) * factor(name) for name in (self._beside, "energy"))
         value = without_round_off(point[self.follow] * factor(self.follow), self._largest)
         return (
             f"{value:14.8g}  {energy:12.6g}  {force:12.6g}"
             f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
         )
 
-    @property
-    def stiffness(self) -> float:
-        """What forces and energies that are round-off are compared with."""
-        return self.strip.section.stiffness
-
-    def felt(self, name: str) -> str:
-        """Return the column that is conjugate to a number, up to a sign and a factor."""
-        return CONJUGATE.get(name, "energy")
-
-    def told_values(self, point: Point) -> list[tuple[str, float]]:
-        """Return the two columns of the table that a run shows, behind the number that is followed: the second one first."""
-        return [("F_tangent", self.strip.reactions(point)["F_tangent"]), ("energy", point["energy"])]
-
     def describe(self, event: np.void, largest: float) -> str:
         name, factor = self.follow, self.scene.factor(self.follow)
         label, error = event["label"].decode(), event[f"error_{name}"] * factor
-        shown = dict.fromkeys(("energy", self.felt(name)))  # and what is conjugate to the followed number
+        shown = dict.fromkeys(("energy", self.strip.conjugate(name)))  # and what is conjugate to the followed number
         others = "".join(f", {text}" for text in (self._with_error(event, column) for column in shown) if text)
         singular = label_of(label).singular
         found = f" (± {error:.0e})" if singular and not math.isnan(error) else ""
@@ -380,40 +326,10 @@ def _rounded(value: float, error: float) -> str:
     return "0" if abs(value) < error else f"{value:.10g}"
 
 
-# --- the first state --------------------------------------------------------------------------------------------------
-
-
-def first_state(scene: OpenScene) -> Point:
-    """Return the state from which the first stage starts.
-
-    Raises
-    ------
-    ConfigError
-        It was not found, or nothing determines it.
-    """
-    strip, mesh = scene.strip(), scene.mesh
-    turn = strip.parameters.get("turn", 0.0)
-    half_twists = turn / math.pi
-    guesses = {
-        "natural": lambda: None, "arch": lambda: strip.arch(), "arch, other side": lambda: strip.arch(side=-1.0),
-        "circle": lambda: strip.twisted_circle(half_twists), "twisted": lambda: strip.twisted(turn),
-    }  # fmt: skip
-    try:
-        guess, values, intervals = guesses[scene.begin](), None, mesh.intervals
-        if strip.roller is not None:
-            intervals = strip.roller.intervals(mesh.intervals)
-            if guess is not None and "roller" not in scene.numbers:  # it touches the strip where it is
-                values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
-        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(scene), newton=newton_of(scene))
-    except (ProblemError, ValueError) as error:
-        raise ConfigError(f"begin: {scene.begin}: {error}") from error
+def first_state(scene: StagedScene) -> Point:
+    """Return the state from which the first stage starts; raise ConfigError where there is none."""
+    return OpenStage(scene, 1).first()
 
 
 def newton_of(scene: StagedScene) -> Newton:
     return Newton(scene.steps.newton_tolerance or Newton.tolerance)
-
-
-def _mesh_control(scene: OpenScene) -> MeshControl:
-    mesh = scene.mesh
-    every = 0 if scene.roller else mesh.adapt_every  # a mesh point stays at the roller
-    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, every)

@@ -11,12 +11,12 @@ import itertools
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, show
+from branches.scene.fields import ConfigError, Interval, MeshConfig, Scene, StepConfig, Strict, show
 from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text
@@ -265,6 +265,39 @@ class StagedScene(Scene):
                         f"stage {number}: {name!r}{meant(name, known)} must be one of the columns {', '.join(known)}"
                     )
 
+    #: A column that the table of a run shows beside the followed number and the energy; '' for what is conjugate to the number.
+    BESIDE: ClassVar[str] = ""
+    #: Fields that say what is held.
+    SUPPORTS: ClassVar[str]
+
+    @abstractmethod
+    def first(self, grows: Mapping[str, float], options: dict[str, Any]) -> tuple[Any, str]:
+        """Return the state from which the first stage starts, a `contin.Point`, and how it was found, in words; '' for nothing.
+
+        Raises
+        ------
+        ConfigError
+            There is none, or nothing determines it.
+        """
+
+    @abstractmethod
+    def replacing(self, stage: int) -> Sequence[str]:
+        """Return the names of the loads that replace reactions in a stage."""
+
+    @abstractmethod
+    def column_words(self, name: str) -> tuple[str, str]:
+        """Return the words of a column, and those of its axis."""
+
+    def told_axes(self, stage: int) -> Iterable[str]:
+        """Return what the words of directions mean that a stage brings."""
+        return ()
+
+    @functools.cached_property
+    def found_names(self) -> tuple[str, ...]:
+        """The columns of what is found in states."""
+        found = (self.strip(number).found_names for number in range(1, len(self.stages) + 1))
+        return ("potential", *dict.fromkeys(itertools.chain.from_iterable(found)))
+
     @property
     def stage_count(self) -> int:
         return len(self.stages)
@@ -348,6 +381,8 @@ class OpenScene(StagedScene):
 
     #: Lengths are over that of the strip.
     longest: ClassVar[float] = 1.0
+    BESIDE: ClassVar[str] = "F_tangent"
+    SUPPORTS: ClassVar[str] = "start, finish"
 
     def factor(self, name: str) -> float:
         """Return what a number of the strip is multiplied by to have its unit."""
@@ -355,6 +390,46 @@ class OpenScene(StagedScene):
             return 1.0
         length, modulus, _ = _unit_of(name)
         return self.dimensions.length**length * self.modulus**modulus
+
+    @property
+    def units(self) -> str:
+        """What lengths and moduli are measured in."""
+        sizes = self.dimensions
+        length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
+        modulus = "1" if sizes is None else f"1 ({self.modulus:.12g} N m^2)"
+        return f"bending modulus B = {modulus}, length L = {length}"
+
+    def column_words(self, name: str) -> tuple[str, str]:
+        """Return the words of a column, and those of its axis."""
+        from branches.scene.words import of_strips
+
+        return of_strips(name)
+
+    def replacing(self, stage: int) -> Sequence[str]:
+        """Return the names of the loads that replace reactions in a stage."""
+        from ribbon_model.loads import REPLACING
+
+        return [name for name in REPLACING if name in self.strip(stage).numbers]
+
+    def first(self, grows: Mapping[str, float], options: dict[str, Any]) -> tuple[Any, str]:
+        """Return the state from which the first stage starts, and ''; raise ConfigError where there is none."""
+        from contin import ProblemError
+
+        strip, intervals, values = self.strip(), self.mesh.intervals, None
+        turn = strip.parameters.get("turn", 0.0)
+        guesses = {
+            "natural": lambda: None, "arch": lambda: strip.arch(), "arch, other side": lambda: strip.arch(side=-1.0),
+            "circle": lambda: strip.twisted_circle(turn / math.pi), "twisted": lambda: strip.twisted(turn),
+        }  # fmt: skip
+        try:
+            guess, roller = guesses[self.begin](), strip.roller
+            if roller is not None:
+                intervals = roller.intervals(intervals)
+                if guess is not None and "roller" not in self.numbers:  # it touches the strip where it is
+                    values = {"roller": sum(x * y for x, y in zip(guess(roller.at)[4:7], roller.direction))}
+            return strip.first_point(guess, values, intervals, **options), ""
+        except (ProblemError, ValueError) as error:
+            raise ConfigError(f"begin: {self.begin}: {error}") from error
 
     @property
     def modulus(self) -> float:

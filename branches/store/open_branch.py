@@ -1,7 +1,8 @@
-"""A result file of an open strip in memory: stages with their pieces, shapes, and what snaps release."""
+"""A result file of an open strip or a network in memory: stages with their pieces, shapes, and what snaps release."""
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,30 +11,37 @@ import numpy as np
 
 from branches.draw.solid import widest
 from branches.draw.strip import ROOM, SIDE, View
-from branches.draw.structure import flat_across, moved, parts_of, standing
+from branches.draw.structure import Structure, flat_across, moved, parts_of, standing
 from branches.scene.labels import without_round_off
 from branches.store.branch import Piece, Snap, StoredBranch
 from branches.store.files import StoreError
+from branches.store.fixtures import fixtures
+from branches.store.layout import OPEN
 from contin.lowlevel import PALETTE, Collocation, levels
 from ribbon_model.changed_supports import fitted
 from ribbon_model.ends import DIRECTIONS
-from ribbon_model.equilibrium import strains_of
-from ribbon_model.open_strip import OpenStrip
-from ribbon_model.shape import Shape, interpolated, shape_of
+from ribbon_model.network import Network
+from ribbon_model.shape import Shape, interpolated
 
+#: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
+_VIEW = View(-70.0, 20.0)
 #: Width of drawn strips of unknown dimensions, over the length of the longest.
 _WIDTH = 0.06
 
 
 class OpenBranch(StoredBranch):
-    """The result file of an open strip; as `branches.read.StoredBranch`, with lengths over that of the strip."""
+    """The result file of an open strip or a network; as `branches.read.StoredBranch`.
+
+    Lengths are over that of the strip, or in the unit of the network. Strains and tables have the strips one after the
+    other, in the order of the network's members.
+    """
 
     def strains(self, point: int) -> np.ndarray:
         """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
         return self.shape_at(point, *self.states_at(point))[1]
 
-    def _strip(self, point: int) -> OpenStrip:
-        """Return the strip of the stage of a point."""
+    def _strip(self, point: int) -> Network:
+        """Return the mechanics of the stage of a point."""
         return self.scene.strip(int(self.points["stage"][point]))
 
     def _numbers(self, point: int) -> dict[str, float]:
@@ -42,7 +50,7 @@ class OpenBranch(StoredBranch):
         return {name: float(row[name]) if name in names else 0.0 for name in self._strip(point).problem.parameters}
 
     def shape(self, point: int) -> Shape:
-        """Return the strip at a kept point, of length 1, on the axes of its first end."""
+        """Return the strips at a kept point, on the axes of the drawing or, of an open strip, of its first end."""
         return self.shape_at(point, *self.states_at(point))[0]
 
     def discretized(self, point: int) -> tuple[Collocation, np.ndarray]:
@@ -54,29 +62,45 @@ class OpenBranch(StoredBranch):
         system = Collocation(strip.problem, t[::degree], degree, free, numbers)
         return system, system.pack(states, numbers)
 
-    def shape_at(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
-        """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
-        strip, values = self._strip(point), self._numbers(point)
-        rates = strip.problem.batch("field").values(t, states, states[:0], np.array([*values.values()]))
-        strains, material, numbers = strains_of(states[:, :4], rates), strip.section, SimpleNamespace(**values)
-        shape = flat_across(shape_of(t, states, strains), material.form)
-        along = {
-            field: np.array([float(material.datum(name)(s, numbers)) for s in t])
-            for field, name in (("breadth", "width"), ("depth", "thickness")) if name in material.along
-        }  # fmt: skip
-        return replace(shape, **along), strains
+    def shape_at(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape | Structure, np.ndarray]:
+        """Return shape and strains (strips K, 3) of states (K, n) at parts t (K,) of the lengths."""
+        network, values, shapes = self._strip(point), np.array([*self._numbers(point).values()]), []
+        for shape, (name, member) in zip(network.shapes_at(t, states, values).values(), network.members.items()):
+            section = network.sections[member.section]
+            numbers = SimpleNamespace(**network.numbers_of(member.section, dict(zip(network.problem.parameters, values))))
+            along = {
+                field: np.array([float(section.datum(name)(s, numbers)) for s in t])
+                for field, name in (("breadth", "width"), ("depth", "thickness")) if name in section.along
+            }  # fmt: skip
+            shapes.append(replace(flat_across(shape, section.form), **along))
+        strains = np.concatenate([*network.strains_at(t, states, values).values()])
+        if self.scene.KIND == OPEN:
+            return shapes[0], strains
+        found = [replace(one, force=self.force(one.number)[point]) if one.number else one for one in fixtures(network)]
+        return Structure(tuple(shapes), tuple(found)), strains
+
+    def force(self, number: str) -> np.ndarray:
+        """Return a dead force at all points, 0 where it is round-off of the largest one in the file."""
+        values = self.points[number]
+        return np.where(np.abs(values) > levels.LOCATED * self._largest, values, 0.0)
+
+    @functools.cached_property
+    def _largest(self) -> float:
+        """The largest dead force in the file."""
+        names = {one.number for stage in self.stages for one in fixtures(stage.strip) if one.number}
+        return max((float(np.abs(self.points[name]).max()) for name in names), default=0.0)
 
     def solution(self, point: int):
         """Open strips have no `ribbon_model.solution.Solution`; raise StoreError."""
         raise StoreError("loops are of closed strips, and this result is of an open one (shape and strains give its states)")
 
     def placed(self, point: int, length: float, cells: int = 0) -> tuple[Shape, np.ndarray]:
-        """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.
+        """Return the strip, or the longest one, of this length, the middle at the origin, and strains in radians per length.
 
         The axes are tangent, width and normal of its first end, or the weight points downwards. Between the nodes of the
         solution, its polynomials are evaluated at further places until there are at least as many ``cells``.
         """
-        nodes = self.states_at(point)[0]
+        nodes, cells = self.states_at(point)[0], -(-cells // len(self._strip(point).members))
         parts = np.arange(pieces := max(1, -(-cells // (len(nodes) - 1)))) / pieces
         t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
         shape, strains = self.shape_at(point, t, interpolated(*self.states_at(point), self.degree(point), t))
@@ -85,8 +109,18 @@ class OpenBranch(StoredBranch):
 
     @property
     def length(self) -> float:
-        """The length of the scene's dimensions; 1 without them."""
-        return self.scene.dimensions.length if self.scene.dimensions else 1.0
+        """The length of the scene's dimensions; without them 1, or that of the longest strip."""
+        return self.scene.dimensions.length if self.scene.dimensions else self.scene.longest
+
+    @property
+    def shape_length(self) -> float:
+        """The length of the longest strip of `shape`."""
+        return self.scene.longest
+
+    @property
+    def length_unit(self) -> str:
+        """As `StoredBranch.length_unit`, '' for the unit of a network."""
+        return "m" if self.scene.dimensions else "L" if self.scene.KIND == OPEN else ""
 
     def width_at(self, length: float, thickness: float | None) -> float | None:
         """Return the width of the scene's dimensions, or that from a thickness and Gamma = w^2/(h L), or None.
@@ -95,14 +129,15 @@ class OpenBranch(StoredBranch):
         """
         if self.scene.dimensions:
             return self.scene.dimensions.width / self.scene.dimensions.length * length
-        Gamma = self.scene.material.get("Gamma")
+        Gamma = self.scene.material.get("Gamma") if self.scene.KIND == OPEN else None
         return math.sqrt(Gamma * thickness * length) if Gamma and thickness else None
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """The direction that is up in pictures: against the weight, if there is one, otherwise the normal of the first end."""
-        strip = self.scene.strip()
-        return tuple(-x for x in strip.weight_direction) if self.is_heavy else DIRECTIONS["normal"]
+        """The direction that is up in pictures: against the weight; without one, the normal of the first end of a strip."""
+        if self.scene.KIND == OPEN and not self.is_heavy:
+            return DIRECTIONS["normal"]
+        return tuple(-x for x in self.scene.strip().weight_direction)
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -128,7 +163,7 @@ class OpenBranch(StoredBranch):
 
     @property
     def view(self) -> View:
-        return SIDE
+        return SIDE if self.scene.KIND == OPEN else _VIEW
 
     @property
     def is_heavy(self) -> bool:

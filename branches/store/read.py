@@ -12,7 +12,7 @@ from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import parse
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
-from branches.store.layout import CLOSED, OPEN
+from branches.store.layout import CLOSED
 from branches.store.writer import open_branch
 
 
@@ -58,18 +58,14 @@ def _branch(file: h5py.File, name: str) -> StoredBranch:
 
 
 def _class_of(scene: Scene) -> type[StoredBranch]:
-    """Return the class of results of a kind of strip; each one needs mechanics that the others do not."""
+    """Return the class of results of a kind of strip; open and closed strips need mechanics that the others do not."""
     if scene.KIND == CLOSED:
         from branches.store.closed_branch import ClosedBranch
 
         return ClosedBranch
-    if scene.KIND == OPEN:
-        from branches.store.open_branch import OpenBranch
+    from branches.store.open_branch import OpenBranch
 
-        return OpenBranch
-    from branches.store.network_branch import NetworkBranch
-
-    return NetworkBranch
+    return OpenBranch
 
 
 def complete_run(path: Path, scene: Scene) -> StoredBranch | None:
