@@ -11,10 +11,10 @@ from .core.trial import Event
 from .cycles.statement import CycleProblem, MapProblem
 from .equilibria.statement import AlgebraicProblem
 from .errors import ContinError, ConvergenceError, ProblemError
-from .results.branch import Branch
+from .results.branch import Branch, Diagram
 from .results.point import Point
 from .results.storage import load, save
-from .search.diagram import Diagram, diagram
+from .search.diagram import diagram
 from .search.further import Search
 from .search.many import batch
 from .search.orbits import cycle, homoclinic

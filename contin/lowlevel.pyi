@@ -22,7 +22,7 @@ from .results.phase_response import PhaseResponse
 from .results.plot import hermite, through
 from .results.point import point_of
 from .results.spectrum import Spectrum
-from .results.storage import StoredColumns, read_columns
+from .results.storage import StoredColumns, read_branches, read_columns
 from .search.further import Searched, further
 from .search.trace import follow, oscillation
 from .text import exact_text, meant, shown
@@ -31,6 +31,6 @@ __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",
     "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
     "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
-    "interpolation", "least", "levels", "locate_branch_point", "meant", "minimum", "oscillation", "point_of", "read_columns",
-    "root", "shown", "temporary_name", "through", "write_whole",
+    "interpolation", "least", "levels", "locate_branch_point", "meant", "minimum", "oscillation", "point_of", "read_branches",
+    "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
 ]  # fmt: skip

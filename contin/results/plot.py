@@ -300,12 +300,17 @@ def _of_motions(points: Sequence[Point]) -> list[bool | None]:
 
     The regular point at one end decides; between two special points, the step before.
     """
-    counts = [None if point.label in _CRITICAL else point.system.unstable(point.x) for point in points]
+    counts = [unstable(point) for point in points]
     found: list[bool | None] = []
     for a, b in pairwise(counts):
         count = b if a is None else a
         found.append((found[-1] if found else None) if count is None else count == 0)
     return found
+
+
+def unstable(point: Point) -> int | None:
+    """Return the number of unstable eigenvalues of an equilibrium, or multipliers of a cycle; None where it is not known."""
+    return None if point.label in _CRITICAL else point.system.unstable(point.x)
 
 
 def _stable(a: Point, b: Point) -> bool | None:

@@ -1,4 +1,4 @@
-"""Branches in files: one ``.npz`` without pickles, from which every point can start another run."""
+"""Branches and diagrams in files: one ``.npz`` without pickles, from which every point can start another run."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from contin.collocation.mesh import basis
 from contin.core.protocol import Discretization
 from contin.core.step import Stop
 from contin.core.system import Scales, System
+from contin.cycles.statement import CycleProblem
 from contin.defining.special_points import BranchPointCurve, FoldCurve
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
@@ -28,13 +29,16 @@ from contin.events.labelled import finding_of
 from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
 from contin.problems.statement import declared
-from contin.results.branch import Branch
+from contin.results.branch import Branch, Diagram, Junction
+from contin.results.plot import unstable
 from contin.results.point import Point
 
 Result = TypeVar("Result")
 
 #: First entry of every file.
 _FORMAT = "contin branch 3"
+#: First entry of files of diagrams: each branch is a file in the file.
+_OF_DIAGRAMS = "contin diagram 1"
 #: First entry of files of version 0.2.
 _OF_VERSION_2 = "contin branch 1"
 #: Fields of a point that are stored as they are.
@@ -49,11 +53,11 @@ _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
 
 @checks.arguments
-def save(branch: Branch, path: str | Path) -> None:
-    """Write a branch, or a curve in two parameters, to a file: all its points, with their solutions.
+def save(branch: Branch | Diagram, path: str | Path) -> None:
+    """Write a branch, a curve in two parameters, or a whole diagram to a file: all points, with their solutions.
 
     The problem is code and is not stored: `load` takes it again. Details of special points are kept where they are those of a
-    branch point or a dictionary of numbers.
+    branch point or a dictionary of numbers; of a diagram its ``searches`` are not.
 
     Raises
     ------
@@ -73,8 +77,32 @@ def save(branch: Branch, path: str | Path) -> None:
     ...     [file.name for file in pathlib.Path(folder).iterdir()]
     ['b.npz']
     """
+    if isinstance(branch, Branch):
+        write_whole(path, _image(branch))
+        return
+    at = {id(point): (i, k) for i, each in enumerate(branch.branches) for k, point in enumerate(each.points)}
+    junctions = [
+        {"point": at[id(one.point)], "depth": one.depth, "taken": [list(taken.items()) for taken in one.taken],
+         "failed": one.failed, "also": [at[id(point)] for point in one.also]}
+        for one in branch.junctions
+    ]  # fmt: skip
+    images = {f"branch{i}": np.frombuffer(_image(each), dtype=np.uint8) for i, each in enumerate(branch.branches)}
+    write_whole(path, _archive({"format": _OF_DIAGRAMS, "branches": len(images), "junctions": junctions}, images))
+
+
+def _archive(head: dict[str, Any], arrays: dict[str, Any]) -> bytes:
+    """Return a file with a head, as JSON, and arrays."""
+    image = io.BytesIO()
+    np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
+    return image.getvalue()
+
+
+def _image(branch: Branch) -> bytes:
+    """Return the file of a branch."""
     if not branch.points:
         raise ProblemError("branch: has no points")
+    first: Any = branch.points[0].system
+    moves = first.is_cycle or not first.is_function_of_t  # eigenvalues of a field in time take a second each
     systems: list[Any] = []
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
@@ -86,8 +114,8 @@ def save(branch: Branch, path: str | Path) -> None:
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
         arrays |= {f"{name}{number}": array for name, array in finding_of(point.details).arrays.items()}
         fields = {name: getattr(point, name) for name in _FIELDS}
-        rows.append({"system": at, **fields, **finding_of(point.details).numbers, "details": _numbers(point.details)})
-    first: Any = branch.points[0].system
+        fields |= {"details": _numbers(point.details), "unstable": unstable(point) if moves else None}
+        rows.append({"system": at, **fields, **finding_of(point.details).numbers})
     head = {
         "format": _FORMAT, "points": rows, "notes": list(branch.notes),
         "stop": branch.stop and [str(branch.stop.reason), branch.stop.message, branch.stop.advice],
@@ -95,9 +123,7 @@ def save(branch: Branch, path: str | Path) -> None:
         "curves": [[system.kind, system.kappa_size] for system in systems if system.on_curve],
         "further": first.size - first.base.size if first.on_curve else 0,  # unknowns that a curve adds
     }  # fmt: skip
-    image = io.BytesIO()
-    np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
-    write_whole(path, image.getvalue())
+    return _archive(head, arrays)
 
 
 def _statement(problem: BoundaryValueProblem | AlgebraicProblem) -> dict[str, Any]:
@@ -147,8 +173,8 @@ def _numbers(details: object) -> dict[str, float] | None:
 
 
 @checks.arguments
-def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
-    """Read a branch from a file, as points of ``problem``.
+def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Any:
+    """Read a `Branch` or a `Diagram` from a file, as points of ``problem``; cycles are those of its equations.
 
     Raises
     ------
@@ -172,24 +198,38 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
         stated: Any = problem
-        own = _statement(problem)
-        if head["states"] != own["states"]:  # without states that follow from others
+        if head["states"] != list(problem.state_names):  # without states that follow from others
             if problem.mass is not None:
                 columns = head["points"][0]["functionals"]
                 stated = stated.without_found([columns.get(problem.state_names[i], 0.0) for i in problem.mass.found])
             stated = stated.on_totals
-            own = _statement(stated)
+        if head["kind"] == CycleProblem.__name__ and isinstance(stated, AlgebraicProblem):
+            stated = CycleProblem.of(stated)
+        own = _statement(stated)
         if any(head[name] not in (own[name], _UNTOLD) for name in own):
             raise ProblemError(f"{str(path)!r} is of another problem: {_said(head)}, not {_said(own)}")
         systems = [_system(stated, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
         return Branch(points, Stop(*head["stop"]) if head["stop"] else None, head["notes"])
 
-    return contents(path, branch)
+    branches, junctions = _contents(path, branch)
+    if junctions is None:
+        return branches[0]
+
+    def point(at: tuple[int, int]) -> Point:
+        return branches[at[0]].points[at[1]]
+
+    return Diagram(branches, [
+        Junction(point(row["point"]), row["depth"], [dict(taken) for taken in row["taken"]],
+                 [tuple(failed) for failed in row["failed"]], [point(at) for at in row["also"]])
+        for row in junctions
+    ])  # fmt: skip
 
 
-def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]], Result]) -> Result:
-    """Return ``make(head, arrays)`` of what a file of `save` holds.
+def _contents(
+    path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]], Result]
+) -> tuple[list[Result], list[dict[str, Any]] | None]:
+    """Return ``make(head, arrays)`` of each branch in a file of `save`, and the junctions of a diagram.
 
     Raises
     ------
@@ -202,7 +242,14 @@ def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]]
         pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
     try:
         with np.load(path, allow_pickle=False) as file:
-            return make(_head(json.loads(file["head"].tobytes())), {name: file[name] for name in file.files})
+            head, arrays = json.loads(file["head"].tobytes()), {name: file[name] for name in file.files}
+        if head["format"] != _OF_DIAGRAMS:
+            return [make(_head(head), arrays)], None
+        found = []
+        for i in range(head["branches"]):
+            with np.load(io.BytesIO(arrays[f"branch{i}"].tobytes()), allow_pickle=False) as file:
+                found.append(make(_head(json.loads(file["head"].tobytes())), {name: file[name] for name in file.files}))
+        return found, head["junctions"]
     except ProblemError:
         raise
     except Exception as error:  # zip, zlib, json, numpy, and memory have many ways to say that a file is damaged
@@ -272,7 +319,8 @@ class StoredColumns:
     ----------
     columns : dict of str to ndarray
         By name, one value a point: all parameters, all functionals, ``arclength``, ``discretization_error`` (of files that hold
-        it), and ``index`` where it is known (-1 where it is not).
+        it), ``norm``, the states of equilibria, with ``max_`` and ``min_`` before their names, too; ``index`` where it is known
+        (-1 where it is not), of equilibria and cycles the number of unstable eigenvalues or multipliers.
     labels, names : list of str
         Of the points; "" for regular ones.
     free : tuple of str
@@ -332,9 +380,31 @@ def read_columns(path: str | Path) -> StoredColumns:
     ...     save(branch, pathlib.Path(folder) / "b.npz")
     ...     stored = read_columns(pathlib.Path(folder) / "b.npz")
     >>> list(stored.columns), stored.free, stored.states
-    (['arclength', 'discretization_error', 'a'], ('a',), ('x',))
+    (['arclength', 'discretization_error', 'a', 'norm', 'x', 'max_x', 'min_x', 'index'], ('a',), ('x',))
     """
-    return contents(path, _columns)
+    return read_branches(path)[0]
+
+
+@checks.arguments
+def read_branches(path: str | Path) -> list[StoredColumns]:
+    """Read what `read_columns` reads of each branch in a file of a diagram; of a file of a branch of this one.
+
+    Raises
+    ------
+    OSError, ProblemError
+        As of `read_columns`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from contin import AlgebraicProblem, diagram, save, solve
+    >>> fork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(diagram(solve(fork, [0.0]), free=["a"], limits={"a": (-1, 1)}), pathlib.Path(folder) / "d.npz")
+    ...     [stored.stop for stored in read_branches(pathlib.Path(folder) / "d.npz")]
+    ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
+    """
+    return _contents(path, _columns)[0]
 
 
 def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
@@ -346,12 +416,21 @@ def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
         columns["discretization_error"] = errors
     columns |= dict(zip(head["names"], values.T))
     columns |= {name: np.array([row["functionals"][name] for row in rows]) for name in rows[0]["functionals"]}
-    if any(row["index"] is not None for row in rows):
-        columns["index"] = np.array([-1 if row["index"] is None else row["index"] for row in rows], dtype=float)
+    profiles = [_profile(head, row, arrays, number) for number, row in enumerate(rows)]
+    found = {"norm": np.array([np.sqrt(weights @ np.sum(states**2, axis=1)) for _, states, weights in profiles])}
+    if all(len(times) == 1 for times, *_ in profiles):
+        for i, name in enumerate(head["states"]):
+            of_state = [states[:, i] for _, states, _ in profiles]
+            found |= {name: np.array([one[0] for one in of_state])}
+            found |= {f"{word}_{name}": np.array([getattr(np, word)(one) for one in of_state]) for word in ("max", "min")}
+    columns |= {name: one for name, one in found.items() if name not in columns}
+    index = [row.get("unstable") if row["index"] is None else row["index"] for row in rows]
+    if any(count is not None for count in index):
+        columns["index"] = np.array([-1 if count is None else count for count in index], dtype=float)
     return StoredColumns(
         columns, [row["label"] for row in rows], [row["name"] for row in rows], tuple(head["free"]),
         " ".join(filter(None, (head["stop"] or ())[1:])), tuple(head["states"]),
-        [_profile(head, row, arrays, number) for number, row in enumerate(rows)],
+        [(times, states) for times, states, _ in profiles],
     )  # fmt: skip
 
 
@@ -371,15 +450,17 @@ def _parameters(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Arr
     return values
 
 
-def _profile(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Array], number: int) -> tuple[Array, Array]:
-    """Return the nodes and the states of a point."""
+def _profile(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Array], number: int) -> tuple[Array, Array, Array]:
+    """Return the nodes and the states of a point, and the weights of the mean over the nodes."""
     at, count = row["system"], len(head["states"])
     x = _solution(head, arrays, number)
     states = x[: len(x) - len(head["free"])].reshape(-1, count)
     if f"scale_states{at}" in arrays:
         states = states * arrays[f"scale_states{at}"]
     if f"mesh{at}" not in arrays:
-        return np.zeros(1), states
+        return np.zeros(1), states, np.full(len(states), 1 / len(states))
     mesh = arrays[f"mesh{at}"]
-    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * basis(head["degrees"][at]).nodes[:-1]
-    return np.append(inner.ravel(), mesh[-1]), states
+    degree, h = head["degrees"][at], np.diff(mesh)[:, None]
+    weights = np.zeros(len(states))
+    np.add.at(weights, degree * np.arange(len(h))[:, None] + np.arange(degree + 1), h * basis(degree).node_weights / h.sum())
+    return np.append((mesh[:-1, None] + h * basis(degree).nodes[:-1]).ravel(), mesh[-1]), states, weights

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Unpack
 
 import numpy as np
@@ -23,162 +22,11 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.events.labelled import finding_of
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.statement import PERIOD, ROUNDS, declared
-from contin.results import plot
-from contin.results.branch import Branch, diagram_to_html
-from contin.results.marks import Axes
+from contin.results.branch import Branch, Diagram, Junction
 from contin.results.point import Point
 from contin.results.record import system_of
 from contin.search.further import Search, Searched, Site, Symmetry, are_one, check_maps, image, seen
 from contin.search.trace import switched, switches
-from contin.text import ROWS, shown
-
-
-@dataclass
-class Junction:
-    """A branch point, Hopf point or period doubling of a diagram: the point, its depth, and which half-branches were followed.
-
-    At Hopf points and period doublings the second branch has one half: the other one is the same cycles, half a period later.
-    ``taken[i]`` maps +1 and -1 to the number of the branch that runs along tangent i that way. ``failed`` lists the switches
-    that did not work, as (tangent, way, reason); ``also`` the points of other branches at the same place.
-    """
-
-    point: Point
-    depth: int
-    taken: list[dict[int, int]]
-    failed: list[tuple[int, int, str]] = field(default_factory=list)
-    also: list[Point] = field(default_factory=list)
-
-    __repr__ = shown
-
-
-@dataclass
-class Diagram:
-    """Branches, and the junctions where they meet; ``searches`` tell where disconnected solutions were looked for (`Search`).
-
-    Examples
-    --------
-    >>> from contin import AlgebraicProblem, diagram, solve
-    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
-    >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
-    >>> [len(found.branches), *(junction.point.label for junction in found.junctions)]
-    [4, 'BP']
-    """
-
-    branches: list[Branch] = field(default_factory=list)
-    junctions: list[Junction] = field(default_factory=list)
-    searches: list[Searched] = field(default_factory=list)
-
-    def __repr__(self) -> str:
-        count, junctions = len(self.branches), len(self.junctions)
-        lines = [f"  {number}: {branch!r}" for number, branch in enumerate(self.branches[:ROWS])]
-        if count > ROWS:
-            lines.append(f"  ... {count - ROWS} more")
-        head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
-        return "\n".join([head, *lines, *self._told()])
-
-    def _told(self) -> list[str]:
-        """Return what the searches say, as lines of text."""
-        more = [f"  ... {len(self.searches) - ROWS} more searches"] * (len(self.searches) > ROWS)
-        caution = ["  What no guess leads to is not found: there may be further solutions."] * bool(self.searches)
-        return [*(f"  {each!r}" for each in self.searches[:ROWS]), *more, *caution]
-
-    @checks.arguments
-    def plot(
-        self, x: str | None = None, y: str | None = None, axes: Axes | None = None, errors: bool = False,
-        color: str | Sequence[str] | None = None,
-    ) -> Any:  # fmt: skip
-        """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
-
-        Parameters
-        ----------
-        x, y : str, optional
-            As in `contin.Branch.plot`. Where cycles are among the branches, ``y`` is a state, the first one by default.
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; a figure of its own without.
-        errors : bool
-            As in `contin.Branch.plot`.
-        color : str or sequence of str, optional
-            As in `contin.Branch.plot`, of all branches, or one for each.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Examples
-        --------
-        >>> from contin import AlgebraicProblem, diagram, solve
-        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
-        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
-        >>> found.plot("a", "x").get_xlabel()
-        'a'
-        """
-        colors = [color] * len(self.branches) if color is None or isinstance(color, str) else list(color)
-        if len(colors) != len(self.branches):
-            raise ProblemError(f"color: {len(colors)} given, must be one for each of the {len(self.branches)} branches")
-        drawn = [(branch.points, each) for branch, each in zip(self.branches, colors) if branch.points]
-        cycles = [points[0].system for points, _ in drawn if points[0].system.is_cycle and points[0].system.intervals]
-        if cycles and y is None:
-            y = cycles[0].problem.states[0]
-        for points, each in drawn:
-            axes = plot.plot(points, x, y, axes, errors, each)
-        return axes
-
-    def _repr_html_(self) -> str:
-        branches = [(branch.points, branch.stop) for branch in self.branches]
-        return diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes), self._told())
-
-    def graph(self) -> Any:
-        """Return the diagram as a ``networkx.MultiGraph``.
-
-        Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
-        the pieces of branches between them (attributes: branch, points, parameter and functional columns).
-
-        Raises
-        ------
-        ImportError
-            networkx is not installed.
-
-        Examples
-        --------
-        >>> from contin import AlgebraicProblem, diagram, solve
-        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
-        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
-        >>> graph = found.graph()
-        >>> sorted(label for _, label in graph.nodes(data="label"))
-        ['BP', 'EP', 'EP', 'EP', 'EP', 'EP', 'EP']
-        """
-        try:
-            import networkx
-        except ImportError as error:
-            raise ImportError("graph needs networkx, which is not installed: pip install networkx") from error
-
-        graph = networkx.MultiGraph()
-        for number, junction in enumerate(self.junctions):
-            graph.add_node(_name(junction, number), label=junction.point.label, depth=junction.depth, **_values(junction.point))
-        for number, branch in enumerate(self.branches):
-            last, since = None, []
-            for place, point in enumerate(branch.points):
-                since.append(place)
-                if not point.label and place + 1 < len(branch.points):
-                    continue
-                node = self._node(point) or f"branch{number}.{place}"
-                if node not in graph:
-                    graph.add_node(node, label=point.label, name=point.name, **_values(point))
-                if last is not None:
-                    columns = {name: branch.column(name)[since] for name in _values(point)}
-                    graph.add_edge(last, node, branch=number, points=len(since), **columns)
-                last, since = node, [place]
-        return graph
-
-    def _node(self, point: Point) -> str | None:
-        for number, junction in enumerate(self.junctions):
-            if any(point is other for other in (junction.point, *junction.also)):
-                return _name(junction, number)
-        return None
-
-
-def _name(junction: Junction, number: int) -> str:
-    return f"{junction.point.label}{number}"
 
 
 def _is_end(point: Point) -> bool:
@@ -192,10 +40,6 @@ def _is_end(point: Point) -> bool:
 def _is_like(point: Point, start: Point) -> bool:
     """Return whether a point is a solution of the kind that a diagram starts with: no cycle, where that is an equilibrium."""
     return point.system.free == start.system.free and type(point.system) is type(start.system)
-
-
-def _values(point: Point) -> dict[str, float]:
-    return {**point.parameters, **point.functionals}
 
 
 class _Explorer:
@@ -347,7 +191,7 @@ class _Explorer:
         A cycle that has shrunk has the coordinates of the Hopf point, one that goes twice round the columns of the period
         doubling, but for the period.
         """
-        ours, theirs = _values(known), _values(point)
+        ours, theirs = ({**each.parameters, **each.functionals} for each in (known, point))
         if known.system.named_states and point.system.size_of_solutions is not None:
             states = known.system.states(known.x).ravel()
             ours |= {f"max_{name}": value for name, value in zip(known.system.problem.states, states)}

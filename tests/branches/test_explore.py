@@ -893,6 +893,20 @@ def test_page_of_stored_branches(stored, browser):
     assert browser.errors == []
 
 
+def test_page_of_a_diagram_of_a_map(tmp_path):
+    """Fixed points and their doubled cycles by the columns that both have; from r = 3 on the fixed points are unstable."""
+    logistic = contin.MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0})
+    found = contin.diagram(contin.solve(logistic, [0.5]), free=["r"], depth=1, limits={"r": (2, 3.3)}, errors=False)
+    contin.save(found, tmp_path / "map.npz")
+    assert main([str(tmp_path / "map.npz"), "--out", str(tmp_path / "map.html")]) == 0
+    data = data_of(tmp_path / "map.html")
+    branches = data["families"][0]["branches"]
+    assert [about["name"] for about in branches] == [f"map {number}" for number in range(len(found.branches))]
+    assert np.array_equal(column(branches[-1], "min_x"), found.branches[-1]["min_x"]) and data["shown"] == ["r", "x"]
+    r, index = column(branches[0], "r"), column(branches[0], "index")
+    assert set(index[r < 3 - 1e-9]) == {0} and set(index[r > 3 + 1e-9]) == {1}
+
+
 def test_kinds_of_results_are_not_mixed(results, stored, tmp_path, capsys):
     folder, _ = stored
     assert main([str(results / "m1_n2.h5"), str(folder / "bratu.npz"), "--out", str(tmp_path / "page.html")]) == 2

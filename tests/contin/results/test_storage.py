@@ -15,12 +15,13 @@ from contin import (
     MapProblem,
     ProblemError,
     curve,
+    diagram,
     load,
     save,
     solve,
     trace,
 )
-from contin.lowlevel import read_columns
+from contin.lowlevel import read_branches, read_columns
 
 #: Files that version 0.2.0 wrote.
 KEPT = Path(__file__).parent / "kept"
@@ -132,6 +133,31 @@ def test_columns_and_states_without_the_problem(tmp_path):
     (tmp_path / "junk.npz").write_bytes(b"junk")
     with pytest.raises(ProblemError, match="no branch stored"):
         read_columns(tmp_path / "junk.npz")
+
+
+def test_a_whole_diagram_in_one_file(tmp_path):
+    """Brusselator: equilibria and the cycles that leave them, which are read as cycles of the same equations."""
+    equations = AlgebraicProblem(
+        lambda u, p: (1 - (p.b + 1) * u.x + u.x**2 * u.y, p.b * u.x - u.x**2 * u.y), ["x", "y"], {"b": 1.0}
+    )
+    found = diagram(solve(equations, [1, 1]), free=["b"], depth=1, limits={"b": (1, 2.2)}, errors=False)
+    save(found, tmp_path / "d.npz")
+    again = load(equations, tmp_path / "d.npz")
+    assert repr(again) == repr(found)
+    for one, other in zip(found.branches, again.branches):
+        assert all(np.array_equal(p.x, q.x) for p, q in zip(one, other))
+    (junction,) = again.junctions
+    assert junction.point is again.branches[0].labelled("HB")[0] and junction.taken == found.junctions[0].taken
+    assert again.graph().number_of_edges() == found.graph().number_of_edges()
+    assert trace(again.branches[-1].points[-1], limits={"b": (1, 2.3)}).stop.reason == "limit"
+    equilibria, _, cycles = read_branches(tmp_path / "d.npz")
+    assert read_columns(tmp_path / "d.npz").columns.keys() == equilibria.columns.keys()
+    for stored, branch in ((equilibria, found.branches[0]), (cycles, found.branches[2])):
+        for name in ("max_x", "min_y", "norm"):
+            assert stored.columns[name] == pytest.approx(branch[name], rel=1e-12)
+    hopf = [point.label for point in found.branches[0]].index("HB")
+    assert equilibria.columns["index"].tolist() == [0] * hopf + [-1] + [2] * (len(found.branches[0]) - hopf - 1)
+    assert (cycles.columns["index"][1:] == 0).all()
 
 
 def test_columns_of_scaled_and_algebraic_problems(tmp_path):
