@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any, Literal, TypedDict
 
 from contin import errors as checks
 from contin import threads
@@ -167,7 +167,7 @@ class Options(TypedDict, total=False):
     """The fields of `Settings` by name, as `trace`, `curve` and `diagram` take them: a type checker knows what is misspelt."""
 
     primary: str | None
-    direction: int
+    direction: int | Literal["both"]
     step: float
     min_step: float
     max_step: float

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Unpack
+from typing import Any, ParamSpec, Unpack
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
+from contin.core.step import Reason
 from contin.core.system import usual
 from contin.core.trial import Trial, linearization
 from contin.cycles.equations import CycleCollocation, PeriodicCollocation
@@ -39,6 +41,7 @@ from contin.problems.statement import PERIOD, ROUNDS, TIME, forget_changed
 from contin.results.branch import Branch
 from contin.results.point import Point, point_of, underlying
 
+_Given = ParamSpec("_Given")
 #: Intervals of the first mesh of a branch from a Hopf point, at least. A run that wants 40 would make its first step on 20 and,
 #: again, on 40: that takes a tenth of a branch of Lorenz's cycles.
 _INTERVALS = 20
@@ -308,12 +311,40 @@ def _smooth(nodes: Array, values: Array) -> Callable[[Any], Any]:
     return polynomial
 
 
+def either_way(function: Callable[_Given, Branch]) -> Callable[_Given, Branch]:
+    """Return a function that follows a branch, and takes ``direction="both"``, too."""
+
+    @functools.wraps(function)
+    def followed(*given: _Given.args, **named: _Given.kwargs) -> Branch:
+        if named.get("direction") != "both":
+            return function(*given, **named)
+        run: Any = function
+        ahead = run(*given, **{**named, "direction": 1})
+        if ahead.stop is None or ahead.stop.reason in (Reason.CLOSED, Reason.INTERRUPTED):
+            return ahead
+        back, first = run(*given, **{**named, "direction": -1}), ahead.points[0]
+        if first.label == Label.END:  # it is none any more
+            first = dataclasses.replace(first, label=Label.REGULAR, name="")
+        stop = dataclasses.replace(ahead.stop, message=f"{ahead.stop.message}; backwards: {back.stop}")
+        return Branch([*map(_backwards, back.points[:0:-1]), first, *ahead.points[1:]], stop, [*back.notes, *ahead.notes])
+
+    return followed
+
+
+def _backwards(point: Point) -> Point:
+    """Return a point of a branch that is passed the other way."""
+    change = point.index_change and point.index_change[::-1]
+    return dataclasses.replace(point, arclength=-point.arclength, tangent=-point.tangent, index_change=change)
+
+
+@either_way
 @checks.arguments
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
           tangent: Array | None = None, progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
-    Ctrl-C ends the run: the branch so far is returned.
+    Ctrl-C ends the run: the branch so far is returned. With ``direction="both"`` it is the branch both ways from the point,
+    where its arclength is 0: from the end of the way of ``direction=-1`` to that of ``direction=1``.
 
     Parameters
     ----------

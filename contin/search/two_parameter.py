@@ -60,7 +60,7 @@ from contin.levels import APART, ROUGH
 from contin.problems.statement import TIME
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.search.trace import small_cycle
+from contin.search.trace import either_way, small_cycle
 
 #: Intervals of the first mesh; it is adapted in any case.
 INTERVALS = 60
@@ -308,6 +308,7 @@ def _homoclinic(base: Algebraic, x: Array) -> First:
     raise ConvergenceError("no homoclinic orbit was found beside the Bogdanov-Takens point")
 
 
+@either_way
 @checks.arguments
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
           event: Event | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
@@ -315,6 +316,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
+    ``direction="both"`` is as in `trace`.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, bratu_mean, elastica, two_elasticas
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Event, ProblemError, Settings, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Event, ProblemError, Settings, curve, solve, trace
 from contin.lowlevel import Collocation, Continuation, point_of
 
 
@@ -259,3 +259,23 @@ def test_branches_that_cross_at_a_small_angle_are_told_apart(size):
     (crossing,) = trace(solve(problem, [0.0]), free=["a"], limits={"a": (-5, 5)}).labelled("BP")
     other = trace(crossing, branch=1, limits={"a": (-5, 5)})
     assert other.points[-1]["x"] == pytest.approx(size * (other.points[-1]["a"] - 1), rel=1e-9)
+
+
+def test_both_ways_at_once():
+    """x**3 - b x + a: folds at a = +-(4/27)**(1/2) of b = 1, and the fork of x (m - x**2), x = +-m**(1/2)."""
+    cubic = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 0.0, "b": 1.0})
+    branch = trace(solve(cubic, [0.0]), free=["a"], direction="both", limits={"a": (-2, 3)})
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"]
+    assert str(branch.stop) == "reached a = -2; backwards: reached a = 3" and branch["a"][0] == 3
+    for fold in branch.labelled("LP"):
+        assert abs(abs(fold["a"]) - math.sqrt(4 / 27)) <= max(fold.errors["a"], 1e-12)
+    s, x, a = branch["arclength"], *branch.curve("x", "a")
+    assert (np.diff(s) > 0).all() and np.abs(x**3 - x + a).max() < 1e-2  # the tangents are turned, too
+    folds = curve(branch.labelled("LP")[0], "b", direction="both", limits={"b": (-1, 2)}, errors=False)
+    assert sorted(folds["a"][[0, -1]] ** 2) == pytest.approx([4 * 8 / 27] * 2)
+    fork = AlgebraicProblem(lambda u, p: (u.x * (p.m - u.x**2),), ["x"], {"m": -1.0})
+    (fork_point,) = trace(solve(fork, [0.0]), free=["m"], limits={"m": (-1, 1)}).labelled("BP")
+    arms = trace(fork_point, branch=1, direction="both", limits={"m": (-1, 1)})
+    assert [point.label for point in arms if point.label] == ["EP", "BP", "EP"] and sorted(arms["x"][[0, -1]]) == [-1, 1]
+    circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.0})
+    assert trace(solve(circle, [1.0]), free=["a"], direction="both").stop.reason == "closed"
