@@ -7,6 +7,7 @@ from branches.store import interrupt
 if __name__ == "__main__":  # before the imports below, which take a second
     interrupt.begin("no picture was written")
 
+import math
 import sys
 from pathlib import Path
 
@@ -23,6 +24,8 @@ def parser() -> Parser:
         "exact quadrature, with nothing computed by continuation",
     )  # fmt: skip
     parser.add_argument("-o", "--out", help="picture to write, .pdf, .svg or .png (default: beside the result, .pdf)")
+    parser.add_argument("--size", metavar="WIDTH", help="width of the picture, as in 90mm, 18cm or 7in; texts fit a narrow one")
+    parser.add_argument("--style", metavar="NAME", help="style of matplotlib: its name, or a file (.mplstyle)")
     of_branch = parser.add_argument_group("a branch")
     of_branch.add_argument("--x", metavar="COLUMN", help="column across (default: the number that is followed)")
     of_branch.add_argument("--y", metavar="COLUMN", help="column upwards (default: what is conjugate to it)")
@@ -56,7 +59,8 @@ def main(argv=None) -> int:
         _check(options, is_diagram)
         figure, out, more = (_diagram if is_diagram else _branch)(options, path)
         check_picture(out)
-        write_picture(figure(), out)
+        with _style(options.style):
+            write_picture(figure(), out)
     except (StoreError, ValueError) as error:
         complain(f"error: {error}")
         return 2
@@ -66,6 +70,33 @@ def main(argv=None) -> int:
 
 #: Options that are for a branch only, and for a diagram only.
 _OF_BRANCH, _OF_DIAGRAM = ("x", "y", "shapes", "width", "view"), ("window", "law", "nu", "plain")
+
+
+#: Units of --size in inches, and the widths that it may have: from less than a column to a poster.
+_INCHES, _SIZES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}, (1.5, 50.0)
+
+
+def _inches(size: str | None) -> float | None:
+    """Return the width of a picture in inches."""
+    if size is None:
+        return None
+    number, unit = size[:-2], size[-2:]
+    try:
+        wide = float(number) * _INCHES[unit]
+    except (KeyError, ValueError):
+        wide = math.nan
+    if not _SIZES[0] <= wide <= _SIZES[1]:
+        raise ValueError(f"--size {size}: must be a number with mm, cm or in, from 1.5in to 50in, as in 90mm")
+    return wide
+
+
+def _style(name: str | None):
+    """Return a context with a style of matplotlib."""
+    from matplotlib import style
+
+    if name is not None and name not in style.available and not Path(name).is_file():
+        raise ValueError(f"--style {name}: is no file, nor one of matplotlib's styles: {', '.join(style.available)}")
+    return style.context([] if name is None else name)
 
 
 def _check(options, is_diagram: bool) -> None:
@@ -88,10 +119,10 @@ def _branch(options, path: Path):
     """Return a function that draws, the picture to write, and a line about what is drawn."""
     from branches.store.read import read_branch
 
-    out = Path(options.out) if options.out else path.with_suffix(".pdf")
+    out, size = Path(options.out) if options.out else path.with_suffix(".pdf"), _inches(options.size)
 
     def figure():
-        given = {name: getattr(options, name) for name in _OF_BRANCH}
+        given = {name: getattr(options, name) for name in _OF_BRANCH} | {"size": size}
         return read_branch(path).plot(**{name: value for name, value in given.items() if value is not None})
 
     return figure, out, ""
@@ -105,7 +136,8 @@ def _diagram(options, path: Path):
     out = Path(options.out) if options.out else path / "diagram.pdf" if path.is_dir() else Path(f"{path.stem}.pdf")
     graph = read_closed(path) if path.is_dir() else read(path)
     law, nu, more = choose(graph, options.law, options.nu)
-    return (lambda: figure(graph, law, nu, options.window, not options.plain)), out, more
+    size = _inches(options.size)
+    return (lambda: figure(graph, law, nu, options.window, not options.plain, size)), out, more
 
 
 def choose(graph, law, nu):

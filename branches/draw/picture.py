@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from branches.draw.strip import View, draw_strip, reach_of
-from branches.draw.style import LINES, OTHER, UNKNOWN, in_words
+from branches.draw.style import LINES, OTHER, UNKNOWN, area, in_words, narrowed, points
 from branches.scene.labels import END, begins
 
 #: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
@@ -26,7 +26,7 @@ _BLACK = "#000000"
 
 def figure(
     branch, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
-    view: tuple[float, float] | None = None,
+    view: tuple[float, float] | None = None, size: float | None = None,
 ):  # fmt: skip
     """Return the picture of a result as a matplotlib figure.
 
@@ -41,15 +41,23 @@ def figure(
         Columns across and upwards; by default each number that is followed, and what is conjugate to it.
     view : (float, float), optional
         The side from which strips are seen, azimuth and elevation in degrees; see `branches.draw.strip.View`.
+    size : float, optional
+        Width in inches; by default 9, or more for several diagrams.
     """
-    from matplotlib.figure import Figure
-
     panels = [(x or branch.panels[0][0], y or branch.panels[0][1])] if x or y else branch.panels[:_PANELS]
     chosen = choose(branch, shapes, {stage for columns in panels for stage in _stages(branch, columns[0])})
-    result = Figure(figsize=(max(9, 3.6 * len(panels)), 6.2 if chosen else 4.5), layout="constrained")
+    usual = max(9, 3.6 * len(panels))
+    with narrowed((size or usual) / usual):
+        return _figure(branch, panels, chosen, width, branch.view if view is None else View(*view), size or usual)
+
+
+def _figure(branch, panels, chosen: list[int], width: float | None, view: View, wide: float):
+    from matplotlib.figure import Figure
+
+    result = Figure(figsize=(wide, points(6.2 if chosen else 4.5)), layout="constrained")
     rows = result.subfigures(2 if chosen else 1, 1, height_ratios=[1, 2.6] if chosen else [1], squeeze=False)[:, 0]
     if chosen:
-        _strips(rows[0], branch, chosen, width, branch.view if view is None else View(*view))
+        _strips(rows[0], branch, chosen, width, view)
     handles: dict[str, Any] = {}
     for number, columns in enumerate(panels):
         axes = rows[-1].add_subplot(1, len(panels), number + 1)
@@ -57,8 +65,9 @@ def figure(
         for handle, word in zip(*axes.get_legend_handles_labels()):
             handles.setdefault(word, handle)
         axes.get_legend().remove()
-    rows[-1].legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False, fontsize=11)
-    result.suptitle(branch.caption, fontsize=12)
+    style = {"loc": "outside lower center", "ncols": 4 if wide > points(7) else 2, "frameon": False}
+    rows[-1].legend(handles.values(), handles.keys(), fontsize=points(11), **style)
+    result.suptitle(branch.caption, fontsize=points(12))
     return result
 
 
@@ -70,7 +79,7 @@ def _strips(row, branch, chosen: list[int], width: float | None, view: View) -> 
     for number, strip in enumerate(strips):
         axes = row.add_subplot(1, len(strips), number + 1)
         draw_strip(axes, strip, wide, reach, view)
-        axes.set_title(chr(ord("a") + number), fontsize=12, y=0.95)
+        axes.set_title(chr(ord("a") + number), fontsize=points(12), y=0.95)
         if number == 0:
             scale_bar(axes, branch, reach)
             if branch.is_heavy:
@@ -84,18 +93,18 @@ def scale_bar(axes, branch, reach: float) -> None:
     decade = 10.0 ** math.floor(math.log10(longest))
     size = max(step * decade for step in (1, 2, 5) if step * decade <= longest)
     x, y = -0.97 * reach, -0.9 * reach
-    axes.plot([x, x + size / unit], [y, y], color=OTHER, lw=2, solid_capstyle="butt")
+    axes.plot([x, x + size / unit], [y, y], color=OTHER, lw=points(2), solid_capstyle="butt")
     words = f"{size:g} {branch.length_unit}".rstrip()
-    axes.annotate(words, (x, y), (0, 3), textcoords="offset points", fontsize=9, color=OTHER)
+    axes.annotate(words, (x, y), (0, 3), textcoords="offset points", fontsize=points(9), color=OTHER)
 
 
 def weight_arrow(axes, reach: float, view: View) -> None:
     """Draw where the weight pulls to."""
     down = -view.axes[:2, 2]
     tail = np.array([-0.9, -0.2]) * reach
-    style = {"arrowstyle": "-|>", "color": OTHER, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
+    style = {"arrowstyle": "-|>", "color": OTHER, "lw": points(1.4), "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tail + 0.4 * reach * down, tail, arrowprops=style)
-    axes.annotate("weight", tail, (4, -4), textcoords="offset points", va="top", fontsize=9, color=OTHER)
+    axes.annotate("weight", tail, (4, -4), textcoords="offset points", va="top", fontsize=points(9), color=OTHER)
 
 
 def _stages(branch, followed: str) -> list[int]:
@@ -138,20 +147,21 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
     unknown = LINES[None][0] if all(piece.stable is None for piece in branch.pieces()) else UNKNOWN
     for piece, (x, y) in drawn:
         dashes, words = LINES[piece.stable] if piece.stable is not None else (unknown, LINES[None][1])
-        axes.plot(x, y, color=branch.colour(piece.stage), ls=dashes, lw=1.8, zorder=1)
+        axes.plot(x, y, color=branch.colour(piece.stage), ls=dashes, lw=points(1.8), zorder=1)
         fill = "white" if piece.stable is False else branch.colour(piece.stage)
         places = across[piece.rows], up[piece.rows]
         if dots:
-            axes.scatter(*places, s=_DOT, facecolors=fill, edgecolors=branch.colour(piece.stage), lw=0.8, zorder=1.5)
+            style = {"facecolors": fill, "edgecolors": branch.colour(piece.stage), "lw": points(0.8), "zorder": 1.5}
+            axes.scatter(*places, s=area(_DOT), **style)
         index = branch.index_on(piece.rows)
         if index > 0:
             words = f"{words}, with the index"
             texts.append(((x[len(x) // 2], y[len(y) // 2]), str(index), branch.colour(piece.stage)))
         if words not in seen:
-            axes.plot([], [], color=OTHER, ls=dashes, lw=1.8, label=_once(words, seen))
+            axes.plot([], [], color=OTHER, ls=dashes, lw=points(1.8), label=_once(words, seen))
     if len(branch.stages) > 1:
         for stage in stages:
-            axes.plot([], [], color=branch.colour(stage), lw=1.8, label=f"stage {stage}")
+            axes.plot([], [], color=branch.colour(stage), lw=points(1.8), label=f"stage {stage}")
     for mark in branch.marks():
         if branch.stage_of[mark.row] in stages:
             place = across[mark.row], up[mark.row]
@@ -162,32 +172,40 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
             target = snap.to[columns[1]] * branch.scene.factor(columns[1])
             _arrow(axes, (across[snap.row], up[snap.row]), target, branch.words_of("energy", snap.released))
     for (_, words), place in zip(axis, (axes.set_xlabel, axes.set_ylabel)):
-        place(words, fontsize=12)
-    axes.tick_params(labelsize=11)
+        place(words, fontsize=points(12))
+    axes.tick_params(labelsize=points(11))
     axes.grid(alpha=0.25)
     axes.margins(0.16, 0.12)
     here = [point for point in chosen if branch.stage_of[point] in stages]
     plain = [point for point in here if branch.points["label"][point] == b""]
-    axes.scatter(across[plain], up[plain], s=18, color=_BLACK, zorder=2)
+    axes.scatter(across[plain], up[plain], s=area(18), color=_BLACK, zorder=2)
     texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point)), _BLACK) for point in here]
     axes.autoscale_view()
+    for column, values, limit in zip(columns, (across, up), (axes.set_xlim, axes.set_ylim)):
+        points_of = branch.points[rows]
+        size, error = np.abs(values[rows]).max(), (points_of["newton_error"] + points_of["discretization_error"]).max()
+        error *= size + branch.scene.factor(column)
+        if np.ptp(values[rows]) <= 10 * error:  # what differs by its error only is a straight line
+            half = (size if size > 10 * error else branch.scene.factor(column)) / 2
+            limit(values[rows].mean() - half, values[rows].mean() + half)
     put(axes, texts, np.concatenate([*(curve.T for _, curve in drawn), np.column_stack([across, up])[rows]]))
-    axes.legend(frameon=False, fontsize=11)
+    axes.legend(frameon=False, fontsize=points(11))
 
 
 def _mark(axes, mark, place, seen: set) -> None:
     """Draw the mark of a labelled point, with a word for the legend where it has none yet, and its text."""
     fill = "white" if mark.open else mark.label.colour  # open: the branch goes on there
     colours = {"color": fill} if mark.label.marker == "x" else {"facecolor": fill, "edgecolor": END}
-    axes.scatter(*place, marker=mark.label.marker, s=mark.label.size, zorder=3, label=_once(mark.word, seen), **colours)
+    size, word = area(mark.label.size), _once(mark.word, seen)
+    axes.scatter(*place, marker=mark.label.marker, s=size, zorder=3, label=word, **colours)
 
 
 def _arrow(axes, place, target: float, released: str) -> None:
     """Draw an arrow from a fold that snaps to the stable state of least energy, and say how much lower that is."""
-    style = {"arrowstyle": "->", "color": _BLACK, "lw": 1.2}
+    style = {"arrowstyle": "->", "color": _BLACK, "lw": points(1.2)}
     axes.annotate("", (place[0], target), place, arrowprops=style, zorder=2)
     words = f"snap: a stable state lies {in_words(released)} lower"
-    axes.plot([], [], color=_BLACK, ls="", marker=r"$\downarrow$", ms=12, label=words)  # in the legend: no curve is hidden
+    axes.plot([], [], color=_BLACK, ls="", marker=r"$\downarrow$", ms=points(12), label=words)  # in the legend: hides no curve
 
 
 def _once(name, seen: set):
@@ -209,11 +227,11 @@ def put(axes, texts, curves: np.ndarray) -> None:
     for (place, text, colour), at in zip(texts, marks):
         if not text:
             continue
-        half = np.array([_WIDE * len(text), _HIGH])
+        half = points(1) * np.array([_WIDE * len(text), _HIGH])
         best = None
         for way in range(_WAYS):
             ahead = np.array([math.cos(2 * math.pi * way / _WAYS), math.sin(2 * math.pi * way / _WAYS)])
-            middle = at + ahead * (_AWAY + np.abs(ahead) @ half)
+            middle = at + ahead * (points(_AWAY) + np.abs(ahead) @ half)
             cost = np.count_nonzero((np.abs(hidden - middle) < half).all(axis=1))
             cost += 100 * sum((np.abs(other - middle) < half + 6).all() for other in marks)
             cost += 200 * any(np.hypot(*(other - middle)) < np.hypot(*(at - middle)) - 1 for other in marks)
@@ -223,5 +241,5 @@ def put(axes, texts, curves: np.ndarray) -> None:
                 best = cost, middle
         boxes.append(np.array([best[1], half]))
         axes.annotate(
-            text, place, best[1] - at, textcoords="offset points", ha="center", va="center", fontsize=11, color=colour
+            text, place, best[1] - at, textcoords="offset points", ha="center", va="center", fontsize=points(11), color=colour
         )

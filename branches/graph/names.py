@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
+from branches.draw.style import points
+
 #: How names are written.
 _STYLE = {
-    "fontsize": 9, "ha": "center", "va": "center", "zorder": 2.5,
+    "ha": "center", "va": "center", "zorder": 2.5,
     "bbox": {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
 }  # fmt: skip
 #: Colour of the thin line from a name to its line.
@@ -46,7 +48,7 @@ def name_lines(axes, named, obstacles, taken=()) -> list[str]:
     for place_for in (_on, _beside, _across):
         left, missing = sorted(range(len(named)), key=lambda i: len(own[i])) if place_for is _on else missing, []
         for number in left:
-            text = axes.text(0, 0, named[number][0], **_STYLE)
+            text = axes.text(0, 0, named[number][0], fontsize=points(9), **_STYLE)
             half = np.array(text.get_window_extent().size) / 2 + _ROOM
             there = np.concatenate([line for i, line in enumerate(own) if i != number] + others)
             line = own[number][((own[number] > frame[0]) & (own[number] < frame[1])).all(axis=1)]

@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from branches.draw.style import CONJUGATE, LINES, NATURAL, NU, OTHER, colour_of, in_words, smooth
+from branches.draw.style import CONJUGATE, LINES, NATURAL, NU, OTHER, area, colour_of, in_words, narrowed, points, smooth
 from branches.graph import disentangle as layered
 from branches.graph.closed import families, pieces, secondaries
 from branches.graph.names import name_lines
@@ -94,7 +94,7 @@ class Line:
             first = last
 
 
-def figure(graph, law: str, nu: float, window=None, disentangle: bool = True):
+def figure(graph, law: str, nu: float, window=None, disentangle: bool = True, size: float | None = None):
     """The diagram of one law and nu.
 
     Parameters
@@ -105,31 +105,41 @@ def figure(graph, law: str, nu: float, window=None, disentangle: bool = True):
         Of kappa_n; by default `WINDOW`, or the part of it in which the special points are.
     disentangle : bool
         Add the panel where the heights between the circles are free (`branches.graph.disentangle`).
+    size : float, optional
+        Width in inches; by default 13, or 7.5 of one panel.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
+    usual = 13 if disentangle else 7.5
+    with narrowed((size or usual) / usual):
+        return _figure(graph, law, nu, window or _window(graph, law, nu), disentangle, size or usual)
+
+
+def _figure(graph, law: str, nu: float, window, disentangle: bool, wide: float):
     from matplotlib.figure import Figure
 
-    found, window = lines(graph, law, nu), window or _window(graph, law, nu)
-    result = Figure(figsize=(13 if disentangle else 7.5, 7.4), layout="constrained")
+    found = lines(graph, law, nu)
+    result = Figure(figsize=(wide, points(7.4)), layout="constrained")
     panels = result.subplots(1, 2 if disentangle else 1, sharex=True, squeeze=False)[0]
     conjugate(panels[0], graph, law, nu, window)
-    panels[0].set_ylabel(CONJUGATE, fontsize=13)
+    panels[0].set_ylabel(CONJUGATE, fontsize=points(13))
     drawn = [[line.kappa_star for line in found]]
     if disentangle:
-        panels[0].set_title("in conjugate coordinates", fontsize=13)
+        panels[0].set_title("in conjugate coordinates", fontsize=points(13))
         drawn.append(schematic(panels[1], graph, law, nu, window))
-        panels[1].set_ylabel("covering index of the circles (heights between: free)", fontsize=13)
-        panels[1].set_title("disentangled", fontsize=13)
+        panels[1].set_ylabel("covering index of the circles (heights between: free)", fontsize=points(13))
+        panels[1].set_title("disentangled", fontsize=points(13))
     for axes in panels:
-        axes.set_xlabel(NATURAL, fontsize=13)
-        axes.tick_params(labelsize=12)
+        axes.set_xlabel(NATURAL, fontsize=points(13))
+        axes.tick_params(labelsize=points(12))
     handles = legend(graph, law, nu, window)
     columns = 3 if max(len(handle.get_label()) for handle in handles) > _LONG else 5
-    result.legend(handles=handles, loc="outside lower center", ncols=columns if disentangle else 2, frameon=False, fontsize=12)
-    result.suptitle(f"Equilibria of a closed strip: {law}{in_words(and_nu(law, nu, NU))}{note(graph)}", fontsize=15)
+    style = {"ncols": columns if disentangle else 2, "frameon": False, "fontsize": points(12)}
+    result.legend(handles=handles, loc="outside lower center", **style)
+    title = f"Equilibria of a closed strip: {law}{in_words(and_nu(law, nu, NU))}{note(graph)}"
+    result.suptitle(title, fontsize=points(15), wrap=True)
     blob = _blob(found, window)
     if blob:  # below the lowest circle there is room
         panels[0].set_ylim(bottom=panels[0].get_ylim()[0] - _BELOW)
@@ -208,7 +218,7 @@ def _inset(axes, graph, law: str, nu: float, found: list[Line], blob: list[Mark]
     heights = [_first_rise(line, next(mark for mark in line.marks if mark in blob), window) for line in here]
     low, high = (np.median([extreme(height) for height in heights]) for extreme in (np.min, np.max))  # the steepest leave it
     inset.set(xlim=window, ylim=(low - 0.12 * (high - low), high))
-    inset.tick_params(labelsize=9)
+    inset.tick_params(labelsize=points(9))
     inset.locator_params(nbins=4)
     axes.indicate_inset_zoom(inset, edgecolor=OTHER, alpha=0.6)
     _name(inset, here, [line.kappa_star for line in here], {blob[0].covering}, [])
@@ -302,13 +312,14 @@ def _height_at(mark: Mark, placed) -> float | None:
 def _draw(axes, line: Line, height) -> None:
     colour = colour_of(line.n) if line.n else _NO_WAVE
     for stable, part in line.parts():
-        style = {"ls": LINES[stable][0], "lw": _WIDTHS[stable], "solid_capstyle": "butt"}
+        style = {"ls": LINES[stable][0], "lw": points(_WIDTHS[stable]), "solid_capstyle": "butt"}
         axes.plot(line.kappa_n[part], height[part], color=colour, zorder=2, **style)
     for mark in line.marks:
         if mark.kind in MARKS:
             marker, colour, size, _ = MARKS[mark.kind]
             edge = {} if marker == "x" else {"edgecolors": END, "linewidths": 0.7}
-            axes.scatter(mark.kappa_n, height[line.place(mark)], marker=marker, color=colour, s=size, zorder=3, **edge)
+            style = {"marker": marker, "color": colour, "s": area(size), "zorder": 3, **edge}
+            axes.scatter(mark.kappa_n, height[line.place(mark)], **style)
 
 
 def _frame(axes, graph, law, nu, window):
@@ -373,7 +384,7 @@ def legend(graph, law: str, nu: float, window=WINDOW) -> list:
     known = {stable for line in found for stable, part in line.parts() if np.any(_within(line.kappa_n[part], window))}
     words = {True: "branch, stable", False: "branch, unstable", None: "branch, stability not known"}
     handles += [
-        Line2D([], [], color=OTHER, ls=LINES[stable][0], lw=_WIDTHS[stable], label=text)
+        Line2D([], [], color=OTHER, ls=LINES[stable][0], lw=points(_WIDTHS[stable]), label=text)
         for stable, text in words.items()
         if stable in known
     ]
@@ -384,7 +395,7 @@ def legend(graph, law: str, nu: float, window=WINDOW) -> list:
         for what in sorted(what for one, what in seen if one == kind):
             edge = {} if marker == "x" else {"markeredgecolor": END, "markeredgewidth": 0.7}
             label = text.format(what)
-            handles.append(Line2D([], [], marker=marker, color=colour, ls="", ms=size**0.5, label=label, **edge))
+            handles.append(Line2D([], [], marker=marker, color=colour, ls="", ms=points(size**0.5), label=label, **edge))
     return handles
 
 

@@ -339,12 +339,12 @@ class StoredBranch(ABC):
 
     def plot(
         self, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
-        view: tuple[float, float] | None = None,
+        view: tuple[float, float] | None = None, size: float | None = None,
     ):  # fmt: skip
         """Return the result as a matplotlib figure; see `branches.draw.picture.figure`."""
         from branches.draw.picture import figure
 
-        return figure(self, shapes, width, x, y, view)
+        return figure(self, shapes, width, x, y, view, size)
 
     def _repr_html_(self) -> str:
         """Return the branch as HTML, for a notebook: name, reason of its end, picture, labelled points."""

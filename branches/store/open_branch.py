@@ -134,10 +134,18 @@ class OpenBranch(StoredBranch):
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """The direction that is up in pictures: against the weight; without one, the normal of the first end of a strip."""
-        if self.scene.KIND == OPEN and not self.is_heavy:
-            return DIRECTIONS["normal"]
-        return tuple(-x for x in self.scene.strip().weight_direction)
+        """The direction that is up in pictures: against the weight; without one, the normal of the first end of a strip.
+
+        Of a network without weight it is z, if dead forces together pull along -z most, otherwise y.
+        """
+        network = self.scene.strip()
+        if not self.is_heavy:
+            if self.scene.KIND == OPEN:
+                return DIRECTIONS["normal"]
+            forces = [direction for load in network.loads.values() for _, direction, _ in load.forces]
+            if forces and (pull := np.sum(forces, axis=0))[2] < -max(abs(pull[0]), abs(pull[1])):
+                return 0.0, 0.0, 1.0
+        return tuple(-x for x in network.weight_direction)
 
     @property
     def shown(self) -> tuple[str, ...]:

@@ -695,6 +695,24 @@ def _portal(law=_STIFF, L=1.0, up=0.0, C=_JOINED, D="clamped", to=0.1):
     return _PORTAL.format(law=law, L=L, foot=up, head=up + L, C=C, D=D, to=to)
 
 
+def test_up_is_against_the_load_and_what_is_round_off_is_a_line(run):
+    """A column along z under a load: it stands in pictures, and before it buckles nothing moves sideways."""
+    text = """
+material: {law: rod, B1: 1.0, B2: 4.0, C: 0.8}
+strips: {column: {begin: [0, 0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}
+joints: {A: [column start], B: [column finish]}
+held: {A: clamped}
+loads: {P: {B: [0, 0, -1]}}
+stages: [{follow: P, to: 1.0}]
+"""
+    branch = run(text)
+    assert branch.up == (0, 0, 1)
+    (part,) = branch.posed([0])[0].parts
+    assert np.ptp(part.centreline @ branch.view.axes[1]) > 0.9
+    low, high = branch.plot(shapes=0, y="B_x").axes[0].get_ylim()
+    assert (low, high) == pytest.approx((-0.5, 0.5), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "text, sentence",
     [

@@ -323,6 +323,27 @@ def test_the_legend_of_the_isotropic_rod_says_which_circle_is_stable_and_why(pre
     assert "circle, stable (a minimum of the energy)" in words and "circle, stable to waves, but it turns inside out" in words
 
 
+def test_a_picture_for_a_column_of_a_journal(stroke):
+    """Texts of 11 points have 7 at least, and all other sizes are as many parts of the usual ones."""
+    usual, narrow = figure(stroke, 0), figure(stroke, 0, size=90 / 25.4)
+    assert narrow.get_size_inches()[0] == pytest.approx(90 / 25.4)
+    small, large = ({text.get_fontsize() for text in one.findobj(Text) if text.get_text()} for one in (narrow, usual))
+    assert sorted(small) == pytest.approx(sorted(0.65 * size for size in large)) and min(small) > 5.8
+    assert usual.get_size_inches()[0] == 9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--size", "90"], "--size 90: must be a number with mm, cm or in, from 1.5in to 50in, as in 90mm"),
+        (["--size", "2mm"], "--size 2mm: must be"),
+        (["--style", "none"], "--style none: is no file, nor one of matplotlib's styles: "),
+    ],
+)
+def test_a_size_or_style_that_is_none(arguments, said, call):
+    assert call(plot.main, "x.h5", *arguments).err.startswith(f"error: {said}")
+
+
 def test_the_title_is_that_of_the_data(tmp_path):
     axes = drawn(tmp_path, "{title: 'Fig. 12a, ribbon', law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
     assert axes.get_title() == "flat rod, (m, n) = (3, 1), $\\nu$ = 0.3"
