@@ -15,7 +15,7 @@ large as a state whose small value is more than nothing, since F_x would be sing
 
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
-from one count (`contin.core.system`).
+from one count (`contin.core.system`): the expansion is not made where three values of F show that none is (`usual`).
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from contin.core.protocol import Carrier, Discretization
 from contin.core.settings import Settings
 from contin.core.system import USUAL, System, usual
 from contin.core.trial import Linearization, Trial
+from contin.errors import ConvergenceError
 from contin.events.folds import on_finer_mesh
 from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import MANY
@@ -47,9 +48,6 @@ _FEWEST = 4
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
 #: close; at .5 what it leaves of others counts as their size.
 _LASTS = 0.1
-#: A size that only a null vector gives is a guess on the side of small ones: above this it is one. Guesses of 1e-3 to 8e-3
-#: make a branch of configs/open_shear.yaml so long that its points do not do.
-_FAR = 9e-4
 #: Round-off is told by what changes where everything is computed again, and once where that is below this part of what was
 #: found. Of single numbers two that are nothing but round-off agree to a
 #: thirtieth in one case of fifty: under one of OpenBLAS's kernels an arch had a multiplier of size 1e-16, and did not move.
@@ -80,7 +78,11 @@ def scaled(
     unknown = [name for name, size in zip(names, sizes) if max(size, given.get(name, 0.0)) < USUAL[0]]
     if unknown or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
-        sizes = first.sizes(np.array([given.get(name, 0.0) for name in names]), _said(primary, settings))
+        said = _said(primary, settings)
+        if said >= USUAL[0] and first.usual(np.isin(names, unknown)):
+            sizes = np.where(sizes < USUAL[0], 1.0, sizes)
+        else:
+            sizes = first.sizes(np.array([given.get(name, 0.0) for name in names]), said)
         small = [name for name, size in held.items() if 0 < size < USUAL[0]]
         counting = first.counting(small, held, sizes) if small else small
         held |= {name: 0.0 for name in small if name not in counting}
@@ -136,6 +138,29 @@ class _FirstPoint:
         slow = abs(rate) * x[moving] <= LOCATED * value * tangent[moving]  # no quotients: zeros may have become 1e-300
         return bool(abs(rate) <= LOCATED and (rate == 0 or (value > 0 and slow.any())))
 
+    @np.errstate(all="ignore")
+    def usual(self, unknown: Pattern) -> bool:
+        """Return whether all sizes are of order one, as changes of F along a random vector show: they are not looked for then.
+
+        For changes of 0.01 in all unknowns, F is nearly linear. For changes of 1, each ``unknown`` that does not change along
+        the branch changes by terms that are not linear; for a change of 1000 of its own, most of that is not linear in it.
+        """
+        largest, at_rest = self.system.largest, self.system.residual(self.x)
+        still = unknown & (largest(self.linear.tangent) < USUAL[0])
+        moved = draws.signs(self._random, largest(self.x)) * self._random.uniform(0.5, 1, unknown.size)
+        missed = []
+        for sizes in (USUAL[0], 1.0, np.where(still, USUAL[1], 1.0)):
+            change = self._kept(np.ones_like(self.x), sizes * moved)
+            try:
+                values = self.system.residual(self.x + change) - at_rest
+            except ConvergenceError:  # outside of the domain of a connection
+                return False
+            missed.append(self._factors.solve(np.append(values, self.row @ change)) - change)
+        near, here, far = missed
+        bent = largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)
+        follows = largest(here) >= USUAL[0]
+        return bool(follows.any() and np.all(largest(near) <= USUAL[0]) and np.all(follows & bent | ~still))
+
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:
         """Return sizes; 0 where nothing is known. ``stated`` are those that are given, ``said`` bounds that of the primary."""
@@ -174,7 +199,7 @@ class _FirstPoint:
         found = np.where(small & ~_counts(found, apart), apart, found)
         guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
         nothing = found < CORRECTED * np.max(found[guessed], initial=0.0)
-        return np.where(guessed & ((found > _FAR) | nothing), np.where(nothing, 0.0, np.maximum(found, 1.0)), found)
+        return np.where(guessed & nothing, 0.0, found)
 
     def _beside(self, number: int) -> tuple[Array, Any, float]:
         """Return a point that differs by one unit in the last place, with factors there, and a factor between one and two.

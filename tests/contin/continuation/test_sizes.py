@@ -84,6 +84,34 @@ def test_a_linear_problem_reaches_a_generous_limit():
     assert str(branch.stop) == "reached a = 1e+09" and branch.points[-1]["x"] == pytest.approx(1e6, rel=1e-12)
 
 
+# --- sizes of order one are not looked for ------------------------------------------------------------------------------
+
+
+def expanded(batch):
+    """Return whether derivatives of second order were made, as the Taylor expansion needs them."""
+    return any(getattr(request, "order", 0) > 1 for request in batch.recorded.kept)
+
+
+def test_usual_sizes_need_no_expansion():
+    bratu = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 0.0}
+    )
+    branch = trace(solve(bratu, [0, 0]), free=["lam"], limits={"lam": (0, 4)}, max_points=20)
+    assert branch.labelled("LP")[0]["lam"] == pytest.approx(3.513830719125161, rel=1e-12)
+    assert branch[0].system.scales.are_one and not expanded(bratu.batch("field"))
+
+
+@pytest.mark.parametrize("load", [1.0, 0.06, 125.0])
+@pytest.mark.parametrize("height", [1.1e-3, 6e3, 1e6])
+def test_one_unusual_amplitude_is_found(load, height):
+    """The load has a usual size; that of the state shows only far from zero, or very near to it: x = height at a = 2 load."""
+    problem = AlgebraicProblem(lambda u, p: ((p.a / load - 1) * u.x - u.x * (u.x / height) ** 2,), ["x"], {"a": 0.0})
+    rest = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, 2 * load)})
+    assert [point["a"] / load for point in rest.labelled("BP")] == pytest.approx([1.0], rel=1e-12)
+    fork = trace(rest.labelled("BP")[0], branch=1, limits={"a": (0, 2 * load)})
+    assert fork.stop.reason == "limit" and abs(fork.points[-1]["x"]) == pytest.approx(height, rel=1e-9)
+
+
 # --- amplitudes ------------------------------------------------------------------------------------------------------
 
 
