@@ -443,7 +443,7 @@ class _FirstPoint:
         """Return a vector changed by one unit in the last place, up or down."""
         return draws.rounded(self._random, v)
 
-    def _kept(self, v: Array, kept: Pattern) -> Array:
+    def _kept(self, v: Array, kept: Pattern | Array) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""
         count = len(self.system.problem.states)
         return v * np.concatenate([np.tile(kept[:count], self.system.state_size // count), kept[count:]])
