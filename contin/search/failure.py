@@ -6,7 +6,8 @@ In this order:
    these geometric series get there, until F is round-off.
 2. Damped steps from the guess, or from beside it where F_x is singular or not finite at it, reach a solution.
 3. F or F_x is not finite, at the guess or where the steps end: the operation, its line and the values are named.
-4. F_x is singular everywhere: conditions follow from others, or jumps decide.
+4. Newton's method goes round between outcomes of conditions: a branch leads through the corners to the solution.
+5. F_x is singular everywhere: conditions follow from others, or jumps decide.
 """
 
 from __future__ import annotations
@@ -20,23 +21,31 @@ import numpy as np
 
 from contin import draws
 from contin import errors as checks
-from contin.arrays import Array, Indices
+from contin.arrays import Array, Indices, Named
 from contin.boundary.statement import BoundaryValueProblem, SegmentedProblem
 from contin.connections.statement import ConnectionProblem
+from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.newton import UNITS, Corrected, Newton, approached, correct
+from contin.core.settings import Settings
 from contin.core.system import System
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.dependence import reduced
-from contin.errors import ConvergenceError
+from contin.equilibria.equations import Algebraic
+from contin.equilibria.statement import AlgebraicProblem
+from contin.errors import ConvergenceError, ProblemError
 from contin.functions.origin import Place, jump, not_finite
+from contin.functions.signature import Signature, named_values
 from contin.levels import APART, CERTAIN, CORRECTED, DEPENDENT, LAST_PLACES, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.border import Bordered, cosine, random_rows
+from contin.problems.rewriting import returning
 
 #: Null vectors are looked for among so many, at most: a free beam in space has six.
 _MOST = 8
 #: Updates shrink by a factor between these where F_x is singular at the solution: by 1/2 at a fold, by 2/3 at a pitchfork.
 _FACTORS = (0.3, 0.9)
+#: Points on the way from a guess through corners.
+_MOST_OF_WAY = 300
 #: Largest difference of two such factors, one after the other: with more, their series is not a geometric one yet.
 _STEADY = 0.05
 
@@ -55,7 +64,52 @@ def recovered(system: System, x: Array, newton: Newton, singular: bool) -> Corre
                 done = correct(system, place, newton=newton, sizes=system.magnitudes)
                 system.check_solution(done.x)
                 return looked_at(system, done) if singular else done
-    return None if starts[-1] is x else _singular_solution(system, starts[-1])
+    if starts[-1] is not x and (found := _singular_solution(system, starts[-1])):
+        return found
+    return _through_corners(system, x, newton) if isinstance(system, Algebraic) and system.conditions else None
+
+
+def _through_corners(system: Algebraic, x: Array, newton: Newton) -> Corrected | None:
+    """Return the solution to which F(x) = (1 - t) F(x0) leads from the guess x0, through corners on the way; or None.
+
+    Newton's method, with the outcomes of each iterate, may go round and round between them (Katzenelson 1965).
+
+    Raises
+    ------
+    ProblemError
+        The equations jump on the way.
+    """
+    problem, names, t = system.problem, system.problem.state_names, "part_of_the_way_"
+    given = returning(problem.residual, Signature(names, tuple(problem.parameters), times=False))
+    known = dict(zip(problem.parameters, map(float, system.all_parameters(x))))
+    u, p = named_values(names)(*map(float, system.states(x)[0])), named_values(tuple(known))(*known.values())
+    missed = [float(value) for value in given(u, p)]
+
+    def residual(u: Named, p: Named) -> list[Any]:
+        return [value - (1 - getattr(p, t)) * gap for value, gap in zip(given(u, p), missed)]
+
+    way = AlgebraicProblem(residual, problem.states, {**known, t: 0.0}, dynamics=False, angles=problem.angles)
+    guess, ends = np.array([*system.states(x)[0], *(known[name] for name in system.free), 0.0]), list[str]()
+    for direction in (1, -1):
+        settings = Settings(
+            limits={t: (-np.inf, 1.0)},
+            direction=direction,
+            newton=newton,
+            branch_points=False,
+            errors=False,
+            max_points=_MOST_OF_WAY,
+            primary=t,
+        )
+        with contextlib.suppress(ConvergenceError):
+            last = list(Continuation(Algebraic(way, [*system.free, t]), guess, settings))[-1]
+            if last[t] == 1:
+                end = np.append(last.system.states(last.x)[0] / system.scales.states, [last[name] for name in system.free])
+                end[system.state_size :] /= system.free_scales
+                return looked_at(system, correct(system, end, newton=newton, sizes=system.magnitudes))
+            ends += [last.name] if last.label == Label.CORNER else []
+    if ends:
+        raise ProblemError(f"guess: no solution lies on the way from it: {ends[0]}")
+    return None
 
 
 def looked_at(system: System, done: Corrected) -> Corrected:

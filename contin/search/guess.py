@@ -184,7 +184,7 @@ class Parsed(NamedTuple):
             raise ProblemError(f"guess: a Point of {found.shape[1]} states for a problem of {count}")
         if found.shape[1] != count:
             raise ProblemError(f"guess: {found.shape[1]} numbers, must be the {count} states")
-        return np.broadcast_to(found, (len(t), count))
+        return np.array(np.broadcast_to(found, (len(t), count)), order="C")  # as kernels take it
 
     def mapped(self, function: Callable[[Array], Array], count: int) -> Parsed:
         """Return the guess for a problem whose states are a function of these."""

@@ -113,6 +113,14 @@ def test_numbers_that_pass_zero_twice_in_a_step(depth):
     assert corners(branch) == ([(-root, "goes on"), (root, "goes on")] if depth > 0 else [])
 
 
+@pytest.mark.parametrize("guess", [0.0, 3.0])
+def test_a_solution_beyond_a_jump_is_not_made_up(guess):
+    """x + 1 for x > 1 jumps over 1.5: Newton's method goes to and fro; from either side the way ends at the jump."""
+    problem = AlgebraicProblem(lambda u, p: (u.x + (1.0 if u.x > 1 else 0.0) - p.a,), ["x"], {"a": 1.5}, dynamics=False)
+    with pytest.raises(contin.ProblemError, match="no solution lies on the way from it: u.x > 1.*the equations jump"):
+        solve(problem, [guess])
+
+
 # --- random piecewise-linear systems -----------------------------------------------------------------------------------
 
 #: The parameter is followed between these ends.
@@ -230,3 +238,14 @@ def test_random_systems(seed):
 @pytest.mark.parametrize("seed", range(100))
 def test_random_systems_in_which_conditions_meet(seed):
     agree(Linear(1000 + seed, meet=2 + seed % 2))
+
+
+@pytest.mark.parametrize("seed", [3, 5, 6, 44, 68, 122])
+def test_solutions_between_which_outcomes_newtons_method_goes_round(seed):
+    """From these guesses it does; the way on which F shrinks evenly leads through corners to a solution on a segment."""
+    system = Linear(seed)
+    names = [f"x{i}" for i in range(system.n)]
+    problem = AlgebraicProblem(system.residual, names, {"a": float(system.z[-1])}, dynamics=False)
+    found = solve(problem, system.z[:-1] + np.random.default_rng(seed).normal(size=system.n))
+    place = np.append(found.x, system.z[-1])
+    assert min(distance(ends, place) for ends in system.pieces()) < 1e-9
