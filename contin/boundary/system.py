@@ -35,7 +35,7 @@ from contin.linalg.condensation import Factorization
 from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the mesh.
-_ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies", "_spectra_found")
+_ON_A_MESH = ("defect", "_workspaces", "_known", "_monodromies")
 
 
 #: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
@@ -599,15 +599,12 @@ class Collocation(System):
         """Return where conditions on states or free parameters switch along a solution, and the equations are not smooth."""
         if not self._selections:
             return NOWHERE
-        if not any(np.array_equal(x, known) for known, _ in self._switchings):
-            parts = [switching(self, each, functools.partial(self._sizes_of, name, x), x) for name, each in self._selections]
-            self._switchings[:] = [(x.copy(), joined(parts))]
-        return self._switchings[0][1]
 
-    @functools.cached_property
-    def _switchings(self) -> list[tuple[Array, Switching]]:
-        """The solution that was looked at last, and where conditions switch along it: a point is asked for several times."""
-        return []
+        def made() -> Switching:
+            sizes = functools.partial(self._sizes_of, x=x)
+            return joined([switching(self, each, functools.partial(sizes, name), x) for name, each in self._selections])
+
+        return self._once("switching", x, made)
 
     def _sizes_of(self, name: str, x: Array) -> Array:
         """Return the sizes of what the values of a function are integrated to."""

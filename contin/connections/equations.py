@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from contin.collocation.newton import Values
 from contin.collocation.projection import Projections, projections
 from contin.connections.branches import homoclinic_points, named, own_test_of
 from contin.core.differences import Numbers, alike, classes, shares, subsets
-from contin.core.spectral import KEPT
 from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.defining.special_points import EventCurve
@@ -32,7 +31,6 @@ from contin.problems.statement import TIME, Statement
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
-_Result = TypeVar("_Result")
 
 
 class SaddleSpectrum(NamedTuple):
@@ -192,19 +190,6 @@ class ConnectionCollocation(Collocation):
     def _subspaces(self, p: Array) -> list[tuple[Array, Array, Callable[[Array], Array]]]:
         """Return Q and L of both ends, and what solves X A P - L A Q^T X = -right for X, once for values of all parameters."""
         return self._once("subspaces", p, lambda: [self._subspace(p, end) for end in (0, 1)])
-
-    def _once(self, what: str, at: Array, make: Callable[[], _Result]) -> _Result:
-        """Return what is made of a vector, made once for the last few of them."""
-        key = what, at.tobytes()
-        if key not in self._known:
-            if len(self._known) > KEPT:
-                self._known.clear()
-            self._known[key] = make()
-        return self._known[key]
-
-    @functools.cached_property
-    def _known(self) -> dict[tuple[str, bytes], Any]:
-        return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
         linear, Q, N = self._linear_at_ends(p)[end], self._bases[end], self._complements[end]

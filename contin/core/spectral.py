@@ -12,15 +12,13 @@ import functools
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from contin import draws
 from contin.arrays import Array, ComplexArray, Mask
 from contin.levels import APART, CERTAIN, CORRECTED, LOCATED
-
-#: Results at points, as sets of eigenvalues, that are kept: more than a search for Hopf points compares.
-KEPT = 64
 
 
 class Spectral:
@@ -31,6 +29,9 @@ class Spectral:
 
     #: `eigenvalue_near` takes less time than all eigenvalues that are wanted: a search then follows one by it.
     finds_nearest = False
+    #: Those of `contin.core.system.System`.
+    _known: Any
+    _once: Any
 
     @abstractmethod
     def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
@@ -52,30 +53,18 @@ class Spectral:
 
     def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
         """Return the eigenvalues at several places, found together."""
-        new = [x for x in places if x.tobytes() not in self._spectra_found]
+        new = [x for x in places if ("eigenvalues", x.tobytes()) not in self._known]
         for x, found in zip(new, self.spectra(new) if new else ()):
-            self._keep(x.tobytes(), found)
+            self._once("eigenvalues", x, functools.partial(tuple, found))
         return [self.eigenvalues(x) for x in places]
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
         return "HB", "Hopf"
 
-    @functools.cached_property
-    def _spectra_found(self) -> dict[bytes, tuple[ComplexArray, ComplexArray]]:
-        return {}
-
-    def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
-        if len(self._spectra_found) > KEPT:
-            del self._spectra_found[next(iter(self._spectra_found))]
-        self._spectra_found[key] = found
-
     def _eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
         """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
-        key = x.tobytes()
-        if key not in self._spectra_found:
-            self._keep(key, self.spectra([x])[0])
-        return self._spectra_found[key]
+        return self._once("eigenvalues", x, lambda: self.spectra([x])[0])
 
 
 def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: ComplexArray, full: float = math.inf) -> Array:

@@ -13,7 +13,7 @@ import functools
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from contin.problems.statement import Statement, with_multipliers
 #: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
 #: numbers, and small ones less.
 USUAL = 1e-2, 1e3
+#: Results at points, as sets of eigenvalues, that are kept: more than a search for Hopf points compares.
+_KEPT = 128
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +171,7 @@ class System(Discretization):
         self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
         self._free = self._indices(self.free)
         self.scales = scales or nothing_scaled(len(problem.states), len(names), self._rows)
+        self._fixed = self.parameters / self.scales.parameters
         #: Sizes of the free parameters.
         self.free_scales: Array = self.scales.parameters[self._free]
 
@@ -187,6 +191,20 @@ class System(Discretization):
         kinds = {name: getattr(type(self), name, None) for name in vars(self)}
         return {name: value for name, value in vars(self).items() if not isinstance(kinds[name], functools.cached_property)}
 
+    @functools.cached_property
+    def _known(self) -> dict[tuple[str, bytes], Any]:
+        """What `_once` has made."""
+        return {}
+
+    def _once(self, what: str, at: Array, make: Callable[[], _Result]) -> _Result:
+        """Return what is made of a vector, made once for the last few of them."""
+        key = what, at.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                del self._known[next(iter(self._known))]
+            self._known[key] = make()
+        return self._known[key]
+
     def _indices(self, names: Sequence[str]) -> Indices:
         """Return the places of parameters among all of them."""
         return np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
@@ -204,7 +222,7 @@ class System(Discretization):
 
     def _scaled_parameters(self, x: Array) -> Array:
         """Return all parameters divided by their sizes."""
-        p = self.parameters / self.scales.parameters
+        p = self._fixed.copy()
         p[self._free] = x[self.state_size :]
         return p
 

@@ -17,7 +17,7 @@ from contin.collocation.corners import breaks_of
 from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
-from contin.core.spectral import KEPT, on_circle
+from contin.core.spectral import on_circle
 from contin.core.step import COLLAPSED, Reason, Stop
 from contin.core.system import Scales
 from contin.core.trial import Event, Trial
@@ -117,10 +117,6 @@ class PeriodicCollocation(OfCycles, Collocation):
         check_windings(problem.angles, self.free, values)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
         self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
-
-    def _take_mesh(self, mesh: Array) -> None:
-        super()._take_mesh(mesh)
-        self._known: dict[bytes, tuple[ComplexArray, list[tuple[ComplexArray, Mask]]]] = {}
 
     @property
     def turn(self) -> Array:
@@ -291,24 +287,17 @@ class PeriodicCollocation(OfCycles, Collocation):
 
     def computed_eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
-        return self._multipliers(x)[0]
+        return self._once("computed", x, lambda: self._computed(x))
 
     def _compared(self, x: Array) -> tuple[ComplexArray, Mask]:
-        """Return the logarithms of the multipliers, and which lie on the unit circle, once."""
-        values, compared = self._multipliers(x)
-        if not compared:  # takes several of them: a zero is located without
-            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
-            compared.append((np.where(neutral & is_pair(values), 1j * values.imag, values), neutral))
-        return compared[0]
+        """Return the logarithms of the multipliers, and which lie on the unit circle."""
 
-    def _multipliers(self, x: Array) -> tuple[ComplexArray, list[tuple[ComplexArray, Mask]]]:
-        """Return the logarithms of the multipliers as computed, once, and what `_compared` keeps of them."""
-        key = x.tobytes()
-        if key not in self._known:
-            if len(self._known) > KEPT:
-                self._known.clear()
-            self._known[key] = self._computed(x), []
-        return self._known[key]
+        def made() -> tuple[ComplexArray, Mask]:  # takes several of them: a zero is located without
+            values = self.computed_eigenvalues(x)
+            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
+            return np.where(neutral & is_pair(values), 1j * values.imag, values), neutral
+
+        return self._once("compared", x, made)
 
     @functools.cached_property
     def _monodromies(self) -> dict[int, Monodromy]:

@@ -108,6 +108,10 @@ class MapSystem(OfCycles, Algebraic):
         """The map."""
         return self.problem.batch("map")
 
+    def _by_x(self, slopes: Array) -> Array:
+        first, last = slopes[:, : self._n].ravel(), np.add.reduce(slopes[:, self._n :])
+        return np.concatenate([first, np.zeros(self.state_size - first.size), last])
+
     def _images(self, x: Array, states: Array) -> Array:
         """Return f at states (K, n), shape (K, n)."""
         return self._residual.values(np.zeros(len(states)), states, self._none, self.all_parameters(x))

@@ -247,12 +247,11 @@ class Algebraic(Spectral, System):
             u = np.ascontiguousarray(self._scaled_states(x)[:count])
             return np.zeros(len(u)), u, self._none, self._scaled_parameters(x)
 
-        def by_x(slopes: Array) -> Array:
-            n = self._none.shape[1]
-            first, last = slopes[:, :n].ravel(), np.add.reduce(slopes[:, n:])
-            return np.concatenate([first, np.zeros(self.state_size - first.size), last])
+        return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), self._by_x)
 
-        return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), by_x)
+    def _by_x(self, slopes: Array) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at the first points, (K, n + k)."""
+        return slopes[0]
 
     @functools.cached_property
     def _residual(self) -> Batch:
@@ -402,7 +401,7 @@ class Algebraic(Spectral, System):
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""
         if self._residual.interpreted is None or not np.any(v):
-            return super().bent(x, w, v)
+            return self._terms[0].bent(x, w, v)
         # two Jacobians instead of one value for each entry
         return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / np.abs(v).max())[0]
 

@@ -650,11 +650,12 @@ class Batch:
 
     def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
         """Return the columns of derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
-        states, kept = len(self.signature.states) * (1 + self.signature.ends), self._own.kept
-        inputs = (*(range(states) if order is None else map(int, order)), *(states + int(slot) for slot in free))
-        if ("columns", inputs) not in kept:
-            kept["columns", inputs] = Columns(np.array(inputs, dtype=np.int64), *self._own.entries(inputs))
-        return kept["columns", inputs]
+        kept, key = self._own.kept, ("columns", tuple(free), None if order is None else tuple(order))
+        if key not in kept:
+            states = len(self.signature.states) * (1 + self.signature.ends)
+            inputs = (*(range(states) if order is None else map(int, order)), *(states + int(slot) for slot in free))
+            kept[key] = Columns(np.array(inputs, dtype=np.int64), *self._own.entries(inputs))
+        return kept[key]
 
     @functools.cached_property
     def depends(self) -> Pattern:
