@@ -15,7 +15,7 @@ import numpy as np
 from contin.core.trial import Event, Trial
 from contin.events.arc import Arc, Place
 from contin.kernels.kernel import kernel
-from contin.kernels.kernel_parts import Matrix
+from contin.kernels.kernel_parts import Matrix, helper
 
 #: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
 #: little less than the distance pi of 1 from -1, or nearer than so many times its change over the step. A pair can reach -1 and
@@ -118,15 +118,18 @@ def _dips(places: list[Place], values: Sequence[float]) -> list[tuple[float, tup
     for three, at_three in zip(zip(places, places[1:], places[2:]), zip(values, values[1:], values[2:])):
         if len(set(np.sign(at_three))) > 1:
             continue
-        at, square, lowest = _parabola([s for s, _ in three], at_three)
-        if square > 0 and three[0][0] < at < three[2][0] and lowest < DEEPER * min(map(abs, at_three)):
+        at, square, lowest = parabola(*(s for s, _ in three), *map(abs, at_three))
+        if three[0][0] < at < three[2][0] and lowest < DEEPER * min(map(abs, at_three)):
             found.append((float(np.sign(at_three[0])), (at, square)))
     return found
 
 
-def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
-    """Return vertex, half the second derivative and value at the vertex of the parabola through three absolute values."""
-    (a, b, c), (first, middle, last) = places, map(abs, values)
+@helper
+def parabola(a: float, b: float, c: float, first: float, middle: float, last: float) -> tuple[float, float, float]:
+    """Return the lowest place of the parabola through values at a, b and c, half its second derivative, and its value there.
+
+    The place is NaN where there is none.
+    """
     if not a < b < c:
         return math.nan, 0.0, math.nan
     before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
@@ -134,7 +137,7 @@ def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, 
     linear = before + square * (b - a)  # the slope at b
     if not square > 0:
         return math.nan, square, math.nan
-    return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
+    return b - linear / (2 * square), square, middle - linear * linear / (4 * square)
 
 
 def followed(
@@ -175,7 +178,8 @@ def followed(
         values = [value(trial) for _, trial in others]
         if min(values) < -flat:
             return others[int(np.argmin(values))]
-        at, square, _ = _parabola(*zip(*sorted([(at, least), (others[0][0], values[0]), (others[1][0], values[1])])))
+        places, sizes = zip(*sorted([(at, least), (others[0][0], values[0]), (others[1][0], values[1])]))
+        at, square, _ = parabola(*places, *map(abs, sizes))
         if not square > 0:
             return None
     return None

@@ -21,7 +21,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -165,32 +165,9 @@ _ASIDE = 1e-2
 _BESIDE = 0.05
 
 
-class _Parabola(NamedTuple):
-    """The rate between two places: first + linear z + square z^2, z from 0 to 1."""
-
-    first: float
-    last: float
-    linear: float
-    square: float
-
-    @property
-    def dips(self) -> bool:
-        """It comes near zero between the places."""
-        return dips(*self)
-
-    @property
-    def ends_low(self) -> bool:
-        """It is near zero at one place already, and lower beside it."""
-        return ends_low(*self)
-
-    def times(self, sense: float) -> _Parabola:
-        """Return the parabola multiplied by a sign."""
-        return _Parabola(sense * self.first, sense * self.last, sense * self.linear, sense * self.square)
-
-
 @helper
 def dips(first: float, last: float, linear: float, square: float) -> bool:
-    """Return whether a parabola comes near zero between the places."""
+    """Return whether a parabola first + linear z + square z^2 comes near zero between the places z = 0 and 1."""
     return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < DEEPER * min(first, last)
 
 
@@ -213,8 +190,8 @@ def may_turn(arc: Arc, fold: Event) -> bool:
     if not ends[0] * ends[1] > 0 or arc.state.sense * ends[1] < 0:
         return True
     search = FoldSearch(arc, fold, lambda: None)
-    parabola = search._parabola((arc.low, arc.before), (arc.step, arc.trial)).times(ends[0])
-    return parabola.dips or parabola.ends_low
+    parabola = ends[0] * search._parabola((arc.low, arc.before), (arc.step, arc.trial))
+    return dips(*parabola) or ends_low(*parabola)
 
 
 class FoldSearch:
@@ -325,8 +302,7 @@ class FoldSearch:
 
     def estimate(self, left: Place, right: Place) -> float | None:
         """Return about where the rate vanishes between two places at which it has opposite signs."""
-        parabola = self._parabola(left, right)
-        first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
+        first, last, linear, square = self._parabola(left, right)
         root = np.sqrt(max(linear**2 - 4 * square * first, 0.0))
         slope = linear + (root if last > first else -root)
         if slope == 0:
@@ -334,11 +310,12 @@ class FoldSearch:
         zero = -2 * first / slope  # the one where the rate goes from first to last
         return float(left[0] + (right[0] - left[0]) * zero) if 0 < zero < 1 else None
 
-    def _parabola(self, left: Place, right: Place) -> _Parabola:
+    def _parabola(self, left: Place, right: Place) -> Array:
+        """Return the parabola of the rate between two places, as `dips` takes it."""
         (a, start), (b, end) = left, right
         first, last = self.rate(start), self.rate(end)
         mean = (end.x[self._index] - start.x[self._index]) / (b - a)
-        return _Parabola(first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean)
+        return np.array([first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean])
 
     def _dip(self, left: Place, right: Place) -> Place | None:
         """Return a place between two of equal rates where the rate has the other sign by more than round-off, or None.
@@ -346,11 +323,11 @@ class FoldSearch:
         Where the parameter stands still and goes on, as at a hysteresis point, signs are round-off.
         """
         parabola = self._parabola(left, right)
-        first, last = parabola.first, parabola.last
+        first, last = parabola[:2].tolist()
         if not (first or last):
             return None
         sign = math.copysign(1.0, first or last)
-        at, square = self._suspect(left, right, parabola if sign > 0 else parabola.times(sign))
+        at, square = self._suspect(left, right, sign * parabola)
         if at is None:
             return None
         flat = LAST_PLACES * max(abs(first), abs(last))
@@ -360,14 +337,14 @@ class FoldSearch:
     def _place(self, s: float) -> Place:
         return s, self.arc.at(s)
 
-    def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[float | None, float]:
+    def _suspect(self, left: Place, right: Place, parabola: Array) -> tuple[float | None, float]:
         """Return a place between two where the rate could come near zero, or None, and half its second derivative.
 
         That is the vertex of the parabola, which is positive at both ends. Where it lies outside, but the rate at one end is
         close to zero already: that end.
         """
         a, width = left[0], right[0] - left[0]
-        first, last, linear, square = parabola
-        if parabola.dips:
+        first, last, linear, square = parabola.tolist()
+        if dips(*parabola):
             return a - width * linear / (2 * square), square / width**2
-        return (left if first < last else right)[0] if parabola.ends_low else None, square / width**2
+        return (left if first < last else right)[0] if ends_low(*parabola) else None, square / width**2

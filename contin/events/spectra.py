@@ -14,7 +14,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.small import Equations, evaluate_slopes
-from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
+from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near, parabola
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import APART, LOCATED
@@ -298,11 +298,7 @@ def _dips(spectra: Spectra) -> bool:
             return True
         a, b, c = parts[k - 1], parts[k], parts[k + 1]
         first, middle, last = abs(values[k - 1]), abs(values[k]), abs(values[k + 1])
-        before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
-        square = (behind - before) / (c - a)
-        linear = before + square * (b - a)
-        if square > 0:
-            at, lowest = b - linear / (2 * square), middle - linear * linear / (4 * square)
-            if a < at < c and lowest < DEEPER * min(first, middle, last):
-                return True
+        at, _, lowest = parabola(a, b, c, first, middle, last)
+        if a < at < c and lowest < DEEPER * min(first, middle, last):
+            return True
     return False
