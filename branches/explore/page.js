@@ -170,14 +170,17 @@ function connect() {
   $("snap").onclick = snap;
   $("copy").onclick = copyLink;
   $("save").onclick = (event) => event.target.dataset.save && save(event.target.dataset.save);
+  $("told").onclick = () => tell("");
   document.addEventListener("keydown", keyPressed);
+  window.addEventListener("beforeprint", () => ($("printed").innerHTML = SHAPES && !now.branch.leftOut ? ribbonSvg("none") : ""));
   window.addEventListener("popstate", () => restore(location.hash));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   new ResizeObserver(placeMarker).observe($("diagram"));
 }
 
 function keyPressed(event) {
-  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT)$/.test(event.target.tagName)) return;
+  const chooses = /^(INPUT|SELECT)$/.test(event.target.tagName) && event.target.id !== "slider";
+  if (event.ctrlKey || event.metaKey || event.altKey || chooses) return;
   if (event.key === " " && /^(BUTTON|SUMMARY)$/.test(event.target.tagName)) return;
   const branches = now.family.branches,
     other = (by) => {

@@ -323,6 +323,14 @@ def test_page_draws_without_errors(page, browser):
     assert browser.colours("#ribbon") > 200  # a lit surface
     assert browser.errors == []
     assert {url.partition(":")[0] for url in browser.requests} <= {"file", "data", "blob"}  # nothing from a network
+    before = browser.js("[document.getElementById('slider').focus(), explore.now.s][1]")
+    browser.key("ArrowRight")  # the slider was dragged: the keys do what the page says
+    assert browser.js("explore.now.s") == pytest.approx(math.floor(before) + 1)
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    browser.js("window.dispatchEvent(new Event('beforeprint'))")
+    seen = "[...document.querySelectorAll('{}')].some((e) => e.checkVisibility())"
+    assert browser.js(seen.format("#printed path")) and not browser.js(seen.format("button, select, input, #ribbon"))
+    browser.call("Emulation.setEmulatedMedia", media="")
     if page.stem != "fig12":
         return  # the longest legend is in Fig. 12
     browser.open(page, width=380, height=800)
@@ -584,6 +592,8 @@ def test_a_link_shows_what_was_shown(diagrams, browser):
     assert browser.js(shown)[2:5] == ["kappa_star", "3", ""]
     told = "document.getElementById('told').textContent"
     assert browser.js(told) == "The link names the branch “absent”, which is not on this page. Shown instead: (1, 2)."
+    browser.js("document.getElementById('told').click()")
+    assert browser.js("document.getElementById('told').hidden")
     browser.js("location.hash = '#branch=ribbon_nu0.3_m3_n4'")
     browser.until(f"{told} === ''")
     assert browser.errors == []
