@@ -41,8 +41,17 @@ class UpToRoundOff(doctest.OutputChecker):
 
 
 def check_examples(module):
-    """Run the examples of a module, each with what the module holds, and numpy as np."""
+    """Run the examples of a module, each with what the module holds, and numpy as np.
+
+    One of a method that imports nothing goes on from that of its class.
+    """
     runner = doctest.DocTestRunner(UpToRoundOff())
-    for example in doctest.DocTestFinder(exclude_empty=True).find(module, extraglobs={"np": np}):
-        runner.run(example)
+    every = doctest.DocTestFinder(exclude_empty=True).find(module, extraglobs={"np": np})
+    found = {one.name: one for one in every if one.examples}
+    for name, one in found.items():
+        owner = found.get(name.rpartition(".")[0])
+        if owner is not None and name.count(".") > module.__name__.count(".") + 1 and "import " not in one.examples[0].source:
+            one.examples = [*owner.examples, *one.examples]
+    for one in found.values():
+        runner.run(one)
     assert runner.failures == 0

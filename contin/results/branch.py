@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -25,6 +25,8 @@ class Branch:
 
     ``notes`` tell what was seen and not understood, with the place: special points that were bracketed and not located, or not
     found again on a finer mesh; a change of the index that the labelled points do not explain. Empty on most branches.
+
+    Examples of methods go on from this one:
 
     Examples
     --------
@@ -68,9 +70,6 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> branch[0].label, branch["a"][[0, -1]].round(10).tolist(), len(branch[1:3])
         ('EP', [1.0, 4.0], 2)
         """
@@ -91,9 +90,6 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> branch.column("a")[[0, -1]].round(10).tolist()
         [1.0, 4.0]
         """
@@ -107,9 +103,6 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> len(branch.labelled("LP")), len(branch.labelled("HB"))
         (1, 0)
         """
@@ -132,13 +125,24 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> list(branch.to_pandas().columns)
         ['label', 'name', 'arclength', 'intervals', 'degree', 'iterations', 'discretization_error', 'a', 'norm']
         """
-        return to_pandas(self.points)
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
+        rows = [
+            {
+                "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
+                "degree": point.system.degree, "iterations": point.iterations,
+                "discretization_error": point.discretization_error,
+                **({} if point.index is None else {"index": point.index}),
+                **({} if point.normal_form is None else {"normal_form": point.normal_form}), **_values(point),
+            }
+            for point in self.points
+        ]  # fmt: skip
+        return pandas.DataFrame(rows).assign(norm=plot.column(self.points, "norm"))
 
     @checks.arguments
     def curve(self, *names: str) -> Array:
@@ -159,9 +163,6 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> a, x = branch.curve("a", "x")
         >>> len(a) > 10 * len(branch), bool(abs(a - x**2).max() < 1e-3)
         (True, True)
@@ -209,16 +210,18 @@ class Branch:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, solve, trace
-        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> branch.plot("a", "x").get_ylabel()
         'x'
         """
         return plot.plot(self.points, x, y, axes, errors, color)
 
     def _repr_html_(self) -> str:
-        return to_html(self.points, self.stop, self.notes)
+        """Return a picture where it can be drawn, labelled points, notes, and why the run ended."""
+        count, ended = len(self.points), f"; {html.escape(str(self.stop))}" if self.stop else ""
+        parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(self.points)}{ended}</p>"]
+        if self.points:
+            parts += [plot.picture(lambda axes: self.plot(axes=axes)), _of_labelled(self.points)]
+        return f"<div>{''.join(parts)}{_paragraphs(self.notes)}</div>"
 
 
 @dataclass
@@ -294,9 +297,6 @@ class Diagram:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, diagram, solve
-        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
-        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
         >>> found.plot("a", "x").get_xlabel()
         'a'
         """
@@ -312,8 +312,16 @@ class Diagram:
         return axes
 
     def _repr_html_(self) -> str:
-        branches = [(branch.points, branch.stop) for branch in self.branches]
-        return diagram_to_html(branches, len(self.junctions), lambda axes: self.plot(axes=axes), self._told())
+        """Return a picture where it can be drawn, a row a branch (points, why it ends), and what the searches say."""
+        count, junctions = len(self.branches), len(self.junctions)
+        head = f"<p><b>Diagram</b> of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}</p>"
+        rows = [
+            (f"{i}", f"{len(branch)}", _labels(branch.points), str(branch.stop or "not ended"))
+            for i, branch in enumerate(self.branches)
+        ]
+        drawn = plot.picture(lambda axes: self.plot(axes=axes)) if any(len(branch) for branch in self.branches) else ""
+        table = html_table(("branch", "points", "labels", "end"), rows)
+        return f"<div>{head}{drawn}{table}{_paragraphs(self._told())}</div>"
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.
@@ -328,9 +336,6 @@ class Diagram:
 
         Examples
         --------
-        >>> from contin import AlgebraicProblem, diagram, solve
-        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
-        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
         >>> graph = found.graph()
         >>> sorted(label for _, label in graph.nodes(data="label"))
         ['BP', 'EP', 'EP', 'EP', 'EP', 'EP', 'EP']
@@ -373,26 +378,7 @@ def _values(point: Point) -> dict[str, float]:
     return {**point.parameters, **point.functionals}
 
 
-# --- as tables: for pandas (which is imported when it is asked for), and for a notebook -----------------------------
-
-
-def to_pandas(points: Sequence[Point]) -> Any:
-    """Return all points as a ``pandas.DataFrame``; see `contin.Branch.to_pandas`."""
-    try:
-        import pandas
-    except ImportError as error:
-        raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
-    rows = [
-        {
-            "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "degree": point.system.degree, "iterations": point.iterations, "discretization_error": point.discretization_error,
-            **({} if point.index is None else {"index": point.index}),
-            **({} if point.normal_form is None else {"normal_form": point.normal_form}), **point.parameters,
-            **point.functionals,
-        }
-        for point in points
-    ]  # fmt: skip
-    return pandas.DataFrame(rows).assign(norm=plot.column(points, "norm"))
+# --- as text and tables ---------------------------------------------------------------------------------------------
 
 
 def meshes(points: Sequence[Point]) -> str:
@@ -403,26 +389,6 @@ def meshes(points: Sequence[Point]) -> str:
     fewest, most = min(counts), max(counts)
     between = f"{most}" if fewest == most else f"{fewest} to {most}"
     return f" on {between} interval{'s' * (most != 1)} of degree {points[0].system.degree}"
-
-
-def to_html(points: Sequence[Point], stop: object, notes: Sequence[str] = ()) -> str:
-    """Return a branch for a notebook: a picture where it can be drawn, labelled points, notes, and why the run ended."""
-    count, ended = len(points), f"; {html.escape(str(stop))}" if stop else ""
-    parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(points)}{ended}</p>"]
-    if points:
-        parts += [plot.picture(lambda axes: plot.plot(points, axes=axes)), _of_labelled(points)]
-    return f"<div>{''.join(parts)}{_paragraphs(notes)}</div>"
-
-
-def diagram_to_html(
-    branches: Sequence[tuple[Sequence[Point], object]], junctions: int, draw: Callable[[Any], Any], notes: Sequence[str] = ()
-) -> str:  # fmt: skip
-    """Return a diagram for a notebook: a picture where it can be drawn, a row a branch (points, why it ends), notes."""
-    count = len(branches)
-    head = f"<p><b>Diagram</b> of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}</p>"
-    rows = [(f"{i}", f"{len(points)}", _labels(points), str(stop or "not ended")) for i, (points, stop) in enumerate(branches)]
-    drawn = plot.picture(draw) if any(points for points, _ in branches) else ""
-    return f"<div>{head}{drawn}{html_table(('branch', 'points', 'labels', 'end'), rows)}{_paragraphs(notes)}</div>"
 
 
 def _paragraphs(notes: Sequence[str]) -> str:

@@ -331,18 +331,6 @@ class StoredColumns:
         Names of the states.
     profiles : list of (ndarray (nodes,), ndarray (nodes, states))
         The nodes and the states of each point; the states of an algebraic problem have one node, 0.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from contin import AlgebraicProblem, save, solve, trace
-    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = pathlib.Path(folder) / "b.npz"
-    ...     save(trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)}), path)
-    ...     stored = read_columns(path)
-    >>> list(filter(None, stored.labels)), stored.stop
-    (['EP', 'LP', 'EP'], 'reached a = 4')
     """
 
     columns: dict[str, Array]
@@ -360,7 +348,9 @@ class StoredColumns:
 
 @checks.arguments
 def read_columns(path: str | Path) -> StoredColumns:
-    """Read what a file of `contin.save` holds without the problem, which is code: columns, labels and states.
+    """Read what a file of `contin.save` holds of its branch without the problem, which is code: columns, labels and states.
+
+    Of a diagram it is the first branch; see `read_branches`.
 
     Raises
     ------
@@ -387,23 +377,7 @@ def read_columns(path: str | Path) -> StoredColumns:
 
 @checks.arguments
 def read_branches(path: str | Path) -> list[StoredColumns]:
-    """Read what `read_columns` reads of each branch in a file of a diagram; of a file of a branch of this one.
-
-    Raises
-    ------
-    OSError, ProblemError
-        As of `read_columns`.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from contin import AlgebraicProblem, diagram, save, solve
-    >>> fork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save(diagram(solve(fork, [0.0]), free=["a"], limits={"a": (-1, 1)}), pathlib.Path(folder) / "d.npz")
-    ...     [stored.stop for stored in read_branches(pathlib.Path(folder) / "d.npz")]
-    ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
-    """
+    """Read what `read_columns` does, with the same errors, of each branch in a file: of a diagram, or of one."""
     return _contents(path, _columns)[0]
 
 

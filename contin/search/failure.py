@@ -332,16 +332,12 @@ def _beside(system: System, x: Array) -> Iterator[Array]:
         yield x + sign * draws.ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
 
 
-def _is_plain(system: System) -> bool:
-    """Return whether the problem is a boundary value problem, in segments or not, and no special kind of it."""
-    return type(system.problem) in (BoundaryValueProblem, SegmentedProblem)
-
-
 def dependence(system: System, x: Array) -> str:
     """Return which conditions of a boundary value problem follow from others or contradict them, as a sentence; or ""."""
     if isinstance(system.problem, (CycleProblem, ConnectionProblem)):
         return _of_orbit(system, x, _rank(system, x))
-    rank = _rank(system, x) if _is_plain(system) else None
+    plain = type(system.problem) in (BoundaryValueProblem, SegmentedProblem)  # no special kind
+    rank = _rank(system, x) if plain else None
     if rank is None:
         return ""
     if not rank.null.size:

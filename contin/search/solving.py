@@ -134,7 +134,8 @@ def solve(
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
     forget_changed(problem)
     problem, start, parameters = restated(problem, guess, _checked(parameters))
-    _check_others(problem, others)
+    if any(system_of(other, "others").problem.states != problem.states for other in others):
+        raise ProblemError("others: must be solutions of this problem")
     free = with_multipliers(problem, free)
     if start.point is not None:
         read = winding_names(problem.angles)  # off the guess, as of all others
@@ -193,7 +194,8 @@ def solved(
         x = carry(done.x)
     else:
         done = corrected(system, x)
-    _check_determined(system, done)
+    if why := system.undetermined(done.x):  # others are around it, of which round-off chose one
+        raise ProblemError(why)
     system.check_solution(done.x)
     point = point_of(system, done.x, done.iterations, done.error)
     return dataclasses.replace(point, label=label_of(system, done.x)) if done.singular else point
@@ -262,12 +264,6 @@ def _advice(system: System) -> str:
     )
 
 
-def _check_determined(system: System, done: Corrected) -> None:
-    """Check that a solution does not come with others around it, of which round-off chose one."""
-    if why := system.undetermined(done.x):
-        raise ProblemError(why)
-
-
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
     """Return the free parameter that is held because another one is found in its place, if there is one.
 
@@ -286,12 +282,6 @@ def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequenc
     if len(free) != needed:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
     return None
-
-
-def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
-    for other in others:
-        if system_of(other, "others").problem.states != problem.states:
-            raise ProblemError("others: must be solutions of this problem")
 
 
 def _checked(parameters: Mapping[str, float] | None) -> dict[str, float]:

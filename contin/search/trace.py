@@ -191,11 +191,6 @@ def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) ->
     return max(found.tangents, key=change)
 
 
-def leaves_saddle_node(point: Point) -> bool:
-    """Return whether a point is a non-central homoclinic orbit to a saddle-node, where two curves meet."""
-    return point.label == Label.NON_CENTRAL and not point.system.on_curve
-
-
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:
     """Return the system of the other curve that meets a non-central orbit, the orbit in it, and the tangent there.
 
@@ -413,7 +408,7 @@ def _first(
         if free is not None and checks.names("free", free) != oscillations.free:
             raise ProblemError(f"free: must be left out, or {', '.join(oscillations.free)}, with which oscillations begin")
         return oscillations, first.x, way * along, True
-    if branch == 1 and leaves_saddle_node(start):
+    if branch == 1 and start.label == Label.NON_CENTRAL and not start.system.on_curve:  # two curves meet at such an orbit
         if free is not None:
             raise ProblemError("free: the curve that leaves at NCH has the parameters of the one it was found on; leave it out")
         orbits, x, along = from_non_central(start)

@@ -205,7 +205,8 @@ def leaving(start: Point, kind: str, branch: int) -> First:
     if kind not in start.curves:
         known = f"labelled {start.label!r}: {', '.join(start.curves) or 'none'}"
         raise ProblemError(f"kind: {kind!r} must be one of the curves that leave from the start, {known}")
-    base, x = _equilibrium(start)
+    curve: Any = start.system
+    base, x = curve.base.without_scales(start.x[: curve.base.size])  # the equilibrium, in the user's units
     frequencies = _frequencies(start, base, x)
     if kind == HOMOCLINIC:
         return _homoclinic(base, x)
@@ -214,12 +215,6 @@ def leaving(start: Point, kind: str, branch: int) -> First:
     if start.label == Label.GENERALIZED_HOPF:
         return _corrected_cycle(base, x, frequencies[0], None)
     return _tori(base, x, frequencies, branch) if kind == Label.TORUS else (FoldCurve(base), x, None)
-
-
-def _equilibrium(start: Point) -> tuple[Algebraic, Array]:
-    """Return the equilibrium at a point of a curve, in the user's units."""
-    curve: Any = start.system
-    return curve.base.without_scales(start.x[: curve.base.size])
 
 
 def _frequencies(start: Point, base: Algebraic, x: Array) -> list[float]:

@@ -80,7 +80,7 @@ def test_a_point_with_a_large_kernel_is_printed():
 def test_options_are_the_fields_of_settings():
     fields = {field.name: field.type for field in dataclasses.fields(contin.Settings)}
     assert Options.__annotations__.keys() == fields.keys()
-    fields["direction"] += " | Literal['both']"  # a run has one way, and what a user calls may go both
+    fields["direction"] += " | Literal['both']"  # of trace and curve
     assert {name: hint.__forward_arg__ for name, hint in Options.__annotations__.items()} == fields
 
 
