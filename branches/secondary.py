@@ -63,7 +63,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
     """
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)
-    graph = _diagram_in(folder)
+    graph = read(folder) if (folder / DIAGRAM).exists() else new_graph()
     old = _remove_secondaries(graph, primaries)
     there = {data["file"] for _, _, data in graph.edges(data=True)}
     for name, branch in primaries.items():
@@ -99,11 +99,6 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
     if not found:
         raise StoreError(f"{str(result)!r} holds no branch with its index on the cell; run its scene with stability: true")
     return found
-
-
-def _diagram_in(folder: Path):
-    """Return the diagram of a folder, or a new one."""
-    return read(folder) if (folder / DIAGRAM).exists() else new_graph()
 
 
 def _remove_secondaries(graph, primaries) -> list[dict]:

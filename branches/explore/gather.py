@@ -52,7 +52,7 @@ def gather(results: list[str], quiet: bool = True) -> dict:
     stored = [path for path in files.values() if path.suffix == STORED]
     if not stored:
         with Progress("branches", len(files), quiet) as progress:
-            return _of_strips(list(files.values()), titles, progress)
+            return _of_strips(list(files.values()), titles, progress, slow=len(files) <= _SLOW)
     if other := next((path for path in files.values() if path.suffix != STORED), None):
         raise StoreError(f"{str(other)!r} is of a strip, {str(stored[0])!r} is not; a page shows one kind of result")
     return profiles.gathered(stored)
@@ -63,14 +63,10 @@ def left_out(data: dict) -> list[dict]:
     return [branch for family in data["families"] for branch in family["branches"] if not branch["shapes"]]
 
 
-def _of_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
+def _of_strips(files: list[Path], titles: list[str], progress: Progress, slow: bool) -> dict:
     """Return the data of a page of strips, of the kind of the first one."""
-    if read_branch(files[0]).scene.KIND == CLOSED:
-        return _of_closed_strips(files, titles, progress)
-    return strips.stages_gathered(files, next(filter(None, titles), ""), slow=len(files) <= _SLOW)
-
-
-def _of_closed_strips(files: list[Path], titles: list[str], progress: Progress) -> dict:
+    if read_branch(files[0]).scene.KIND != CLOSED:
+        return strips.stages_gathered(files, next(filter(None, titles), ""), slow)
     branches = _read(files, progress)
     title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
     families: dict[tuple, list[dict]] = {}

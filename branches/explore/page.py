@@ -33,18 +33,14 @@ _WIDTHS = {"strips": "3", "branches": "3", "open": "6"}
 CLASSES = {"strips": "strips", "branches": "branches", "open": "branches of-open"}
 
 
-def _title(data: dict) -> str:
-    """The title of results without one: it names their laws."""
-    return f"Equilibria of a closed strip: {', '.join(dict.fromkeys(family['law'] for family in data['families']))}"
-
-
 def assemble(data: dict) -> str:
     """The page that shows ``data``, as of `gather.gather`."""
     folder = resources.files(__package__)
     template, style, *scripts = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", *SCRIPTS))
     licence = (folder / _LICENCE).read_text(encoding="utf-8")
+    laws = ", ".join(dict.fromkeys(family.get("law", "") for family in data["families"]))
     parts = {
-        "title": html.escape(data["title"] or _title(data)), "style": style,
+        "title": html.escape(data["title"] or f"Equilibria of a closed strip: {laws}"), "style": style,
         "library": base64.b64encode((folder / _LIBRARY).read_bytes()).decode(),
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),

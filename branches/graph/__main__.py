@@ -60,17 +60,13 @@ def main(argv=None) -> int:
     """Answer the queries; return the exit code."""
     options = parser().parse_args(argv)
     try:
-        lines = list(_answers(read(options.folder), options))
+        graph = read(options.folder)
+        lines = list({CLOSED_FORMAT: _of_closed_strips, OPEN_FORMAT: _of_open_strips}[graph.graph["format"]](graph, options))
     except (StoreError, KeyError) as error:
         complain(f"error: {error.args[0]}")
         return 2
     write_output("\n".join(lines) + "\n")
     return 0
-
-
-def _answers(graph, options) -> Iterable[str]:
-    answers = {CLOSED_FORMAT: _of_closed_strips, OPEN_FORMAT: _of_open_strips}
-    return answers[graph.graph["format"]](graph, options)
 
 
 def _of_closed_strips(graph, options) -> Iterable[str]:

@@ -96,14 +96,10 @@ class ClosedBranch(StoredBranch):
         for event in self.events:
             letters = event["label"].decode()
             kind = kind_of(letters, event["name"].decode(), self.reason, bool(self.scene.origin))
-            natural = kind == "user value" and self.scene.strip and math.isclose(event["kappa_n"], self._natural)
+            strip = self.scene.strip if kind == "user value" else None
+            natural = strip and math.isclose(event["kappa_n"], Strip(**strip).kappa_n)
             word = "natural curvature of the strip" if natural else _WORDS.get(kind, kind)
             yield Mark(int(event["point"]), label_of(letters), kind == "leaves", word)
-
-    @property
-    def _natural(self) -> float:
-        """The natural curvature of the scene's strip."""
-        return Strip(**self.scene.strip).kappa_n
 
     def colour(self, stage: int) -> str:
         return colour_of(self.scene.n)
