@@ -25,12 +25,12 @@ from collections import Counter, namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 import contin
-from contin import ContinError, Point, ProblemError, solve, trace
+from contin import ContinError, ConvergenceError, Point, ProblemError, solve, trace
 from contin.lowlevel import Collocation, Continuation, Label, Undetermined, levels, locate_branch_point, point_of
 from ribbon_model import ends, law_end, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, JOINT, LOOSE, End, Roller, Support, Vector, product
@@ -57,6 +57,8 @@ FOLLOWER = "follower_pressure"
 MECHANISM = (
     "can move, or turn about itself, without a change of energy, so nothing determines the state; hold more, or join rigidly"
 )
+#: The same of a network that is held too little.
+LOOSELY_HELD = "held: the network can move as a rigid body without resistance; hold more places or rotations"
 #: A frame that is not turned.
 _UNTURNED = (1.0, 0.0, 0.0, 0.0)
 #: Why forces are not determined.
@@ -64,6 +66,8 @@ UNDETERMINED = (
     "joints: what is joined and held repeats itself in this state, so the forces are not determined (straight strips between "
     "places that are held cannot lengthen); draw a strip with a bend, or hold less"
 )
+#: Most phases: a strip can shift and turn about itself.
+_MOST_PHASES = 2
 #: The mesh of first states: a coarse one has solutions that are none.
 _MESH = contin.MeshControl(1e-9, max_intervals=200)
 #: Most points of the way from the drawing without stress. Where a gap cannot close, forces grow without end: 60 points of a
@@ -619,7 +623,18 @@ class Network:
 
     def guess(self) -> list[Callable]:
         """Return the drawing as a guess, one function of s for each member."""
-        return [functools.partial(_drawn_at, member, len(self.integrals)) for member in self.members.values()]
+        return [functools.partial(_drawn_at, member) for member in self.members.values()]
+
+    def padded(self, guess: Any) -> Any:
+        """Return a guess of quaternion and centreline, in a form of `contin.solve`, with zeros for integral conditions."""
+        count, more = len(FRAME) + len(CENTRELINE), np.zeros(len(self.integrals))
+        if isinstance(guess, Point):
+            return guess
+        if callable(guess):
+            return lambda s: np.append(guess(s)[:count], more)
+        if isinstance(guess, list):
+            return [self.padded(begun) if callable(begun) else np.append(begun[:count], more) for begun in guess]
+        return guess[0], np.hstack([guess[1][:, :count], np.tile(more, (len(guess[0]), 1))])
 
     def first_point(
         self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options
@@ -648,11 +663,12 @@ class Network:
         except ContinError as error:
             first = error
         if is_drawn and (told := self._undetermined()):
-            raise ProblemError(told) from first
+            raise ProblemError(self.with_advice(told, guess, values or {}, options)) from first
         try:
             drawn = self.state_near(guess, {**(values or {}), **self._unstressed}, **options)
         except ContinError as error:
-            raise ProblemError(UNDETERMINED if Undetermined.CONDITIONS in str(error) else str(error)) from first
+            reason = self.law_at(guess) or self.with_advice(self.reason(error), guess, values or {}, options)
+            raise ProblemError(reason) from first
         way = trace(drawn, free=[ASSEMBLY], limits={ASSEMBLY: (0, 1)}, branch_points=False, progress=False, max_points=_MOST)
         if abs(way[-1][ASSEMBLY] - 1) > LOOSE:
             nearest = max(way, key=lambda point: point[ASSEMBLY])
@@ -665,9 +681,11 @@ class Network:
             reason.nearest = nearest
             raise reason
         try:
-            return self._determined(solve(self.problem, way[-1])), "from the drawing without stress, step by step"
+            point = solve(self.problem, way[-1])
+            self.check_determined(point)
+            return point, "from the drawing without stress, step by step"
         except ContinError as error:  # the way has come there: what fails is the matrix
-            raise ProblemError(self._mechanism(way[-1])) from error
+            raise ProblemError(self.with_advice(self._mechanism(way[-1]), guess, values or {}, options)) from error
 
     def _check_reach(self) -> None:
         """Raise ProblemError for joints that are held farther apart than the strips between them are long."""
@@ -697,10 +715,9 @@ class Network:
 
     def _undetermined(self) -> str:
         """Return what nothing determines in the drawing without stress, or which law has no value there; '' if all is well."""
-        t, other, problem = np.linspace(0, 1, 101), self, self.problem
-        for name, member in self.members.items():
-            if told := law_end.at_guess(self.sections[member.section], t, member.drawn(member.length * t)[:, :4]):
-                return f"strips: {name.partition(' ')[0]}: {told}"
+        other, problem = self, self.problem
+        if told := self.law_at(self.guess()):
+            return told
         if not problem.has_index:
             loads = {name: replace(load, followers=()) for name, load in self.loads.items()}
             other = replace(self, loads=loads, numbers={name: x for name, x in self.numbers.items() if name != FOLLOWER})
@@ -714,10 +731,101 @@ class Network:
         try:
             return "" if drawing.second_variation().is_determined else other._mechanism(drawing)
         except ProblemError as error:
-            return UNDETERMINED if Undetermined.CONDITIONS in str(error) else ""
+            return self.undetermined if Undetermined.CONDITIONS in str(error) else ""
+
+    #: Why forces or states are not determined, and what a first state is near to, in words.
+    undetermined: ClassVar[str] = UNDETERMINED
+    neutral: ClassVar[str] = MECHANISM
+    near: ClassVar[tuple[str, str, str]] = ("the drawing", "the drawing", "another drawing")
+
+    def law_at(self, guess: Any) -> str:
+        """Return that a law has no value at a guess, in a sentence; '' where it has, or where the guess is a point."""
+        t = np.linspace(0, 1, 401)
+        if isinstance(guess, Point):
+            return ""
+        if isinstance(guess, tuple):
+            t, frames = guess[0], [guess[1]]
+        else:
+            begun = zip(guess if isinstance(guess, list) else [guess], self.members.values())
+            frames = [np.array([one(member.length * s) if callable(one) else one for s in t]) for one, member in begun]
+        for (name, member), states in zip(self.members.items(), frames):
+            if told := law_end.at_guess(self.sections[member.section], t, states[:, :4]):
+                return f"strips: {name.partition(' ')[0]}: {told}"
+        return ""
+
+    def reason(self, error: Exception) -> str:
+        """Return why no state was found, in the words of networks."""
+        if isinstance(error, ConvergenceError):
+            return self._not_found()
+        return self.undetermined if Undetermined.CONDITIONS in str(error) else str(error)
+
+    def _not_found(self) -> str:
+        """Return that no first state was found, and which numbers may be nearer to where one is known."""
+        guess, known, another = self.near
+        far = [name for name in self._prescribed if abs(self.parameters[name] - self._usual.get(name, 0.0)) > LOOSE]
+        acting = [name for name in self.acting if self.parameters[name] != 0]
+        nearer = [f"smaller loads ({', '.join(acting)})"] if acting else []
+        nearer += [f"{', '.join(far)} nearer to {known}"] if far else []
+        if self.closed:  # its place and turn are what makes it closed
+            stiff = "a softness (1, say)" if any(one.constrained for one in self.sections.values()) else "B2 nearer to B1"
+            nearer = [*nearer[: len(acting) > 0], stiff]
+        first = f"begin with {' and '.join(nearer)}, and follow them in a stage; or " if nearer else ""
+        return f"no equilibrium was found near {guess}; {first}begin with {another}"
+
+    @property
+    def acting(self) -> list[str]:
+        """Names of the loads."""
+        return [*self.loads, *(name for name in (*POTENTIALS, FOLLOWER) if name in self.numbers)]
+
+    @property
+    def closed(self) -> bool:
+        """Whether there is a single strip, whose ends are joined."""
+        both = [self.joint_at(JointEnd(name, end)) for name in self.members for end in (START, FINISH)]
+        return len(both) == 2 and both[0] == both[1] != ""
+
+    def with_advice(self, reason: str, guess: Any, values: Mapping[str, float], options: Mapping[str, Any]) -> str:
+        """Return the reason why nothing determines the state of one strip, with the fewest phases that do: all are tried."""
+        others = [name for name, phase in PHASES.items() if phase not in self.phases]
+        apt = len(self.members) == 1 and (reason.endswith(self.neutral) or reason == self._not_found())
+        for count in range(1, _MOST_PHASES - len(self.phases) + 1) if apt else ():
+            fits = [names for names in itertools.combinations(others, count) if self._fits(names, guess, values, options)]
+            if fits:
+                more = "further phases" if self.phases else "phases"
+                return f"{reason}, or give {more}: {' or '.join(str([*names]) for names in fits)}"
+        return reason
+
+    def _fits(self, names: Sequence[str], guess: Any, values: Mapping[str, float], options: Mapping[str, Any]) -> bool:
+        """Return whether phases determine the state near a guess, and hold by symmetry: their multipliers vanish."""
+        other = self.phased((*self.phases, *names))
+        if isinstance(guess, Point):
+            guess = guess.system.nodes, guess.system.states(guess.x)
+        try:
+            point = solve(other.problem, other.padded(guess), values, **options)
+            other.check_determined(point)
+        except ContinError:
+            return False
+        return not point.phase_loads()
+
+    def phased(self, phases: Sequence[str | Phase]) -> Network:
+        """Return the network with these phases."""
+        return replace(self, phases=phases)
+
+    def check_determined(self, point: Point) -> None:
+        """Raise ProblemError where something can move without a change of energy, if there is one, or forces are not known."""
+        if not self.problem.has_index:
+            return
+        try:
+            if point.second_variation().is_determined:
+                return
+        except ProblemError as error:
+            if Undetermined.MODE not in str(error):
+                raise ProblemError(self.reason(error)) from error
+        raise ProblemError(self._mechanism(point))
 
     def _mechanism(self, point: Point) -> str:
         """Return which strips move without a change of energy in a state."""
+        if not self.floats and self.moves_rigidly(point.system.states(point.x), point.parameters):
+            return LOOSELY_HELD
         if not self.problem.has_index:
             return f"joints: the network {MECHANISM}"
         variation = point.second_variation()
@@ -800,7 +908,9 @@ class Network:
         ContinError
             There is none, or nothing determines it.
         """
-        return self._determined(solve(self.problem, guess, values, **{"mesh": _MESH, **options}))
+        point = solve(self.problem, self.padded(guess), values, **{"mesh": _MESH, **options})
+        self.check_determined(point)
+        return point
 
     def with_phases(self, point: Point, nullity: int = 2, free: int = 1) -> tuple[Network, Point]:
         """Return the network with phases that hold neutral modes of a state, and the state as one of it.
@@ -871,12 +981,6 @@ class Network:
             change = np.abs(states[:, places[:7]] - drawn) / np.repeat([1.0, self.longest], [4, 3])
             away = max(away, float(change.max()))
         return away
-
-    def _determined(self, point: Point) -> Point:
-        """Return a state; raise ProblemError where something can move without a change of energy, if loads have one."""
-        if self.problem.has_index and not point.second_variation().is_determined:
-            raise ProblemError(self._mechanism(point))
-        return point
 
     @property
     def _sizes(self) -> dict[str, float]:
@@ -1143,5 +1247,5 @@ def _at_arm(state: np.ndarray, arm: Vector) -> np.ndarray:
     return np.array(_moved(list(map(float, state)), arm))
 
 
-def _drawn_at(member: Member, phases: int, s: float) -> np.ndarray:
-    return np.append(member.drawn([s])[0], np.zeros(phases))
+def _drawn_at(member: Member, s: float) -> np.ndarray:
+    return member.drawn([s])[0]

@@ -7,7 +7,6 @@ ends: `ribbon_model.ends`. The reactions are the force and the moment that the s
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -19,9 +18,8 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from contin import ContinError, ConvergenceError, Point, ProblemError, solve
 from contin.lowlevel import Collocation, Undetermined, shown
-from ribbon_model import ends, law_end, loads
+from ribbon_model import ends, loads
 from ribbon_model.ends import ANGLES, CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End, Roller, Support
-from ribbon_model.equilibrium import CENTRELINE, FRAME
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.members import FINISH, Joint, JointEnd, Load, Member
 from ribbon_model.network import Network
@@ -29,6 +27,18 @@ from ribbon_model.phases import PHASES, Phase
 from ribbon_model.section import Section, natural_end, natural_states
 from ribbon_model.shape import Shape
 
+#: Why a state is not determined.
+RIGID = "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
+UNHELD = (
+    "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
+    "state; hold more"
+)
+#: Why reactions are not determined.
+UNDETERMINED = (
+    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip is held at "
+    "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
+    "softness, or hold less"
+)
 #: Columns of the reactions.
 REACTIONS = tuple(
     f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
@@ -39,8 +49,6 @@ _CONJUGATE = {
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
     "weight": "rise", "roller": "F_roller", "stroke": "F_stroke",
 }  # fmt: skip
-#: Most phases of a strip: it can shift and turn about itself.
-_MOST_PHASES = 2
 #: A first guess: a function of the arclength that returns quaternion and centreline, seven numbers.
 Guess = Callable[[float], list[float]]
 #: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
@@ -140,7 +148,7 @@ class OpenStrip(Network):
     @functools.cached_property
     def _usual(self) -> dict[str, float]:
         """Place and frame of the last end, and place at a roller, of the natural state."""
-        found = {} if set(ends.numbers_of(self.finish)) <= set(self.numbers) else natural_end(self.section)
+        found = natural_end(self.section)
         if self.roller is None:
             return found
         return found | {"roller": float(natural_states(self.section, [self.roller.at])[0, 4:] @ self.roller.direction)}
@@ -202,15 +210,6 @@ class OpenStrip(Network):
 
         return guess
 
-    def _padded(self, guess):
-        """Return a guess with zeros for integral conditions."""
-        count, more = len(FRAME) + len(CENTRELINE), [0.0] * len(self.integrals)
-        if callable(guess):
-            return lambda t: [*guess(t)[:count], *more]
-        if isinstance(guess, Point):
-            return guess
-        return guess[0], np.hstack([guess[1][:, :count], np.zeros((len(guess[0]), len(more)))])
-
     def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=None, **options) -> Point:
         """Return the state near a guess (the natural state without one), as `contin.solve` does.
 
@@ -224,26 +223,23 @@ class OpenStrip(Network):
         if guess is None:
             s = np.linspace(0, 1, 401)
             guess = s, natural_states(self.section, s)
-        guess = self._padded(guess)
         if degree is None and not isinstance(guess, Point):
             degree = 6
         options = {"intervals": intervals, "degree": degree, **options}
-        self._check_phases(values or {})
+        values = {**(values or {})}
+        self._check_phases(values)
         try:
-            point = solve(self.problem, guess, values, **options)
-        except ContinError as error:
-            unloaded = {name: 0.0 for name in LOADS if name in self.numbers}
-            if unloaded and isinstance(error, ConvergenceError):
-                self._check_unloaded(guess, {**(values or {}), **unloaded}, options)
-            reason = self._reason(error)
-            if reason == UNHELD and isinstance(guess, tuple) and self.moves_rigidly(guess[1], self.parameters | (values or {})):
-                reason = RIGID  # round-off decides whether the solver or the index notices
-            raise ProblemError(self._law_at(guess) or self._with_phases(reason, guess, values, options)) from error
-        try:
+            point = solve(self.problem, self.padded(guess), values, **options)
             self.check_determined(point)
-        except ProblemError as error:
-            raise ProblemError(self._law_at(guess) or self._with_phases(str(error), guess, values, options)) from error
-        return point
+            return point
+        except ContinError as error:
+            unloaded = values | dict.fromkeys(self.acting, 0.0)
+            if self.acting and isinstance(error, ConvergenceError):
+                self._check_unloaded(guess, unloaded, options)
+            reason = self.reason(error)
+            if reason == UNHELD and isinstance(guess, tuple) and self.moves_rigidly(guess[1], self.parameters | values):
+                reason = RIGID  # round-off decides whether the solver or the index notices
+            raise ProblemError(self.law_at(guess) or self.with_advice(reason, guess, values, options)) from error
 
     def _check_phases(self, values: Mapping[str, float]) -> None:
         """Raise ProblemError for more phases than symmetries of a strip whose first end is clamped.
@@ -263,86 +259,40 @@ class OpenStrip(Network):
             given = [name for name, phase in PHASES.items() if phase in self.phases]
             raise ProblemError(f"phases: {given}: each holds a continuous symmetry, and the strip has {has} out")
 
-    def _with_phases(self, reason: str, guess, values: Mapping[str, float] | None, options: Mapping) -> str:
-        """Return the reason why nothing determines the state, with the phases that do, as few as possible: all are tried."""
-        if reason not in (UNHELD, self._not_found()):
-            return reason
-        others = [name for name, phase in PHASES.items() if phase not in self.phases]
-        for count in range(1, _MOST_PHASES - len(self.phases) + 1):
-            fits = [names for names in itertools.combinations(others, count) if self._fits(names, guess, values, options)]
-            if fits:
-                more = "further phases" if self.phases else "phases"
-                return f"{reason}, or give {more}: {' or '.join(str([*names]) for names in fits)}"
-        return reason
+    undetermined, neutral = UNDETERMINED, UNHELD
+    near = ("the first guess", "the natural state", "another first state")
 
-    def _fits(self, names: Sequence[str], guess, values: Mapping[str, float] | None, options: Mapping) -> bool:
-        """Return whether phases determine the state near a guess, and hold by symmetry: their multipliers vanish."""
-        strip = OpenStrip(
+    def phased(self, phases: Sequence[str | Phase]) -> OpenStrip:
+        """Return the strip with these phases."""
+        return OpenStrip(
             self.section, self.start, self.finish, self.numbers, self.weight_direction, self.foundation_direction,
-            self.stroke_direction, (*self.phases, *names), self.roller,
+            self.stroke_direction, phases, self.roller,
         )  # fmt: skip
-        if isinstance(guess, Point):
-            guess = guess.system.nodes, guess.system.states(guess.x)
-        try:
-            point = solve(strip.problem, strip._padded(guess), values, **options)
-            strip.check_determined(point)
-        except ContinError:
-            return False
-        return not point.phase_loads()
 
-    def _law_at(self, guess) -> str | None:
-        """Return that the law has no value at a guess, in a sentence; None where it has, or where the guess is a point."""
-        if isinstance(guess, Point):
-            return None
-        if not callable(guess):
-            return law_end.at_guess(self.section, guess[0], guess[1][:, :4])
-        times = np.linspace(0, 1, 401)
-        return law_end.at_guess(self.section, times, np.array([guess(t)[:4] for t in times]))
+    def law_at(self, guess) -> str:
+        """As `Network.law_at`, of the only strip."""
+        return super().law_at(guess).removeprefix("strips: strip: ")
 
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
         try:
-            self.check_determined(solve(self.problem, guess, values, **options))
+            self.check_determined(solve(self.problem, self.padded(guess), values, **options))
         except ContinError as error:
-            raise ProblemError(self._reason(error)) from error
+            raise ProblemError(self.reason(error)) from error
 
-    def _reason(self, error: Exception) -> str:
+    def reason(self, error: Exception) -> str:
         """Return why no state was found, in the words of strips."""
-        if isinstance(error, ConvergenceError):
-            return self._not_found()
-        text = str(error)
-        return UNDETERMINED if Undetermined.CONDITIONS in text else UNHELD if Undetermined.MODE in text else text
-
-    def _not_found(self) -> str:
-        """Return that no first state was found, and which numbers may be nearer to where one is known."""
-        natural = natural_end(self.section)
-        far = [name for name, value in natural.items() if abs(self.parameters.get(name, value) - value) > LOOSE]
-        loads = [name for name in LOADS if self.parameters.get(name, 0.0) != 0]
-        nearer = [f"smaller loads ({', '.join(loads)})"] if loads else []
-        nearer += [f"{', '.join(far)} nearer to the natural state"] if far else []
-        if self._closed:  # its place and turn are what makes it closed
-            stiff = "a softness (1, say)" if self.section.constrained else "B2 nearer to B1"
-            nearer = [*nearer[: len(loads) > 0], stiff]
-        first = f"begin with {' and '.join(nearer)}, and follow them in a stage; or " if nearer else ""
-        return f"no equilibrium was found near the first guess; {first}begin with another first state"
+        return UNHELD if Undetermined.MODE in str(error) else super().reason(error)
 
     @property
-    def _closed(self) -> bool:
+    def closed(self) -> bool:
         """Whether the last end is clamped where the first one is."""
-        return all(end.rotation == CLAMPED and len(end.held) == 3 for end in (self.start, self.finish)) and all(
-            self.parameters.get(name) == 0 for name in PLACE
-        )
+        clamped = all(end.rotation == CLAMPED and len(end.held) == 3 for end in (self.start, self.finish))
+        return clamped and all(self.parameters.get(name) == 0 for name in PLACE)
 
-    def check_determined(self, point: Point) -> None:
-        """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
-        try:
-            if point.second_variation().is_determined:
-                return
-        except ProblemError as error:
-            reason = self._reason(error)
-            if reason != UNHELD:
-                raise ProblemError(reason) from error
-        raise ProblemError(RIGID if self.moves_rigidly(point.system.states(point.x), point.parameters) else UNHELD)
+    def _mechanism(self, point: Point) -> str:
+        """Return why a state is not determined."""
+        return RIGID if self.moves_rigidly(point.system.states(point.x), point.parameters) else UNHELD
 
     def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
         """Return the sizes of states and numbers for `contin.Settings.scales`, at a state.
@@ -409,18 +359,6 @@ class OpenStrip(Network):
 #: The joints of a strip, and its ends there.
 FIRST, LAST = "first", "last"
 _START, _FINISH = JointEnd("strip"), JointEnd("strip", FINISH)
-#: Why a state is not determined.
-RIGID = "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
-UNHELD = (
-    "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
-    "state; hold more"
-)
-#: Why reactions are not determined.
-UNDETERMINED = (
-    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip is held at "
-    "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
-    "softness, or hold less"
-)
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
 

@@ -19,7 +19,17 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.columns import OWN
 from branches.scene.fields import ConfigError, StepConfig, Strict
-from branches.scene.open_strip import Axis, EndWords, FollowConfig, OpenMesh, OwnDirection, StagedScene, finite, numbers_of
+from branches.scene.open_strip import (
+    Axis,
+    EndWords,
+    FollowConfig,
+    OpenMesh,
+    OwnDirection,
+    Phases,
+    StagedScene,
+    finite,
+    numbers_of,
+)
 from ribbon_model.changed_supports import replacing
 from ribbon_model.ends import DIRECTIONS, FREE_END, LOOSE, End
 from ribbon_model.equilibrium import directors
@@ -159,6 +169,9 @@ class NetworkScene(StagedScene):
     loads: dict[str, dict[str, Annotated[ForceConfig, _short("force")]]] = Field(default_factory=dict)
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: NetworkDirections = NetworkDirections()
+    phases: Phases = Field(
+        default_factory=list, max_length=2, description="what a single strip is held by, which shifts or spins"
+    )
     magnetized: Literal["width", "normal", "tangent"] = "tangent"
     stages: list[NetworkStageConfig] = Field(min_length=1, max_length=50)
     mesh: OpenMesh = OpenMesh(degree=6)
@@ -217,7 +230,8 @@ class NetworkScene(StagedScene):
         if waves and not network.floats:
             raise ValueError("stages: phase: a network that is held does not shift; leave it out, or hold nothing")
         phases = [network.with_waves(count).phases[0] for count in waves]
-        return replace(network, phases=[replace(phase, holds=held == count) for phase, count in zip(phases, waves)])
+        phases = [replace(phase, holds=held == count) for phase, count in zip(phases, waves)]
+        return replace(network, phases=(*self.phases, *phases))
 
     def _held(self, stage: int) -> tuple[dict[str, End], tuple[str, ...]]:
         """Return what is held in a stage, and the joints at which that has changed since the first one."""

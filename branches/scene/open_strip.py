@@ -45,6 +45,7 @@ _OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
 #: A direction: in words of the first end of an open strip, of the strip at a joint, which keeps its word, and of space.
 Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value, DIRECTIONS))]
 OwnDirection = Annotated[tuple[float, float, float] | str, BeforeValidator(lambda v: _direction(v, {n: n for n in DIRECTIONS}))]
+Phases = list[Literal["spin", "shift, right", "shift, left", "shift, two waves"]]
 Axis = Annotated[tuple[float, float, float], BeforeValidator(lambda v: _direction(v, dict(zip("xyz", DIRECTIONS.values()))))]
 
 
@@ -344,7 +345,7 @@ class OpenScene(StagedScene):
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: DirectionsConfig = DirectionsConfig()
     begin: Literal["natural", "arch", "arch, other side", "twisted", "circle"] = "natural"
-    phases: list[Literal["spin", "shift, right", "shift, left", "shift, two waves"]] = Field(default_factory=list, max_length=2)
+    phases: Phases = Field(default_factory=list, max_length=2)
     stages: list[StageConfig] = Field(min_length=1, max_length=50)
     mesh: OpenMesh = OpenMesh()
     steps: StepConfig = StepConfig()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contin import solve, trace
+from contin import ProblemError, solve, trace
 from ribbon_model.ends import CLAMP, FREE_END, HINGED, End, Support, hinge, product
 from ribbon_model.laws import FINITE_WIDTH, RIBBON, ROD
 from ribbon_model.network import BALL, FINISH, HINGE, START, Joint, JointEnd, Load, Member, Network, straight
@@ -296,6 +296,33 @@ def _stated(**changes):
         "joints": {"A": Joint([JointEnd("a")]), "K": Joint([JointEnd("a", FINISH), JointEnd("b")])}, "held": {"A": CLAMP},
     }  # fmt: skip
     return Network(**(given | changes))
+
+
+RING = Member(length=1.0, strains=(2 * math.pi, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"held": {"A": hinge()}}, "held: the network can move as a rigid body"),
+        ({"sections": {"strip": Section(RIBBON, {"nu": 0.3})}}, "strips: a: the law 'ribbon' has no value where"),
+        pytest.param(
+            {"members": {"a": RING}, "joints": {"A": Joint([JointEnd("a"), JointEnd("a", FINISH)])}},
+            r"joints: a can move, or turn about itself, .*, or give phases: \['spin'\] or \['shift, right'\]",
+            marks=pytest.mark.full,
+        ),
+    ],
+)
+def test_why_nothing_determines_a_first_state(changes, message):
+    with pytest.raises(ProblemError, match=message):
+        _stated(**changes).first_point()
+
+
+def test_the_phase_that_the_message_gives_determines_the_ring():
+    """A straight isotropic rod bent to a ring of length 1: E = 2 pi**2 B."""
+    ring = _stated(members={"a": RING}, joints={"A": Joint([JointEnd("a"), JointEnd("a", FINISH)])}, phases=("spin",))
+    point, _ = ring.first_point()
+    assert point["energy"] == pytest.approx(2 * math.pi**2, rel=1e-9) and not point.phase_loads()
 
 
 def test_what_is_drawn_without_stress_is_not_assembled():
