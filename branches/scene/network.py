@@ -208,39 +208,24 @@ class NetworkScene(StagedScene):
 
     # --- the network --------------------------------------------------------------------------------------------------
 
-    def strip(self, stage: int = 1) -> Network:
-        """Return the network of a stage; raise ValueError for fields that do not fit."""
-        key = repr((self._held(stage), self.stages[stage - 1].phase))
-        if key not in self._networks:
-            held, changed = self._held(stage)
-            try:
-                self._networks[key] = self._phased(self._network(held, changed), self.stages[stage - 1].phase)
-            except ValueError as error:
-                raise ValueError(f"stage {stage}: {error}" if changed else str(error)) from error
-        return self._networks[key]
-
-    @functools.cached_property
-    def _networks(self) -> dict[str, Network]:
-        """The networks of all stages by what is held."""
-        return {}
-
-    def _phased(self, network: Network, held: int | None) -> Network:
-        """Return a network with the states of the phases of all stages, of which one holds."""
-        waves = list(dict.fromkeys(stage.phase for stage in self.stages if stage.phase is not None))
-        if waves and not network.floats:
-            raise ValueError("stages: phase: a network that is held does not shift; leave it out, or hold nothing")
-        phases = [network.with_waves(count).phases[0] for count in waves]
-        phases = [replace(phase, holds=held == count) for phase, count in zip(phases, waves)]
-        return replace(network, phases=(*self.phases, *phases))
-
-    def _held(self, stage: int) -> tuple[dict[str, End], tuple[str, ...]]:
-        """Return what is held in a stage, and the joints at which that has changed since the first one."""
-        if stage == 1:
-            return {name: end.end(self.axes_at(name)) for name, end in self.held.items()}, ()
+    def _held(self, stage: int) -> tuple[int | None, dict[str, End], tuple[str, ...]]:
+        """Return the phase and what is held in a stage, and the joints at which that has changed since the first one."""
         one = self.stages[stage - 1]
-        held, changed = self._held(one.stage or stage - 1)
+        if stage == 1:
+            return one.phase, {name: end.end(self.axes_at(name)) for name, end in self.held.items()}, ()
+        _, held, changed = self._held(one.stage or stage - 1)
         held = held | {name: end.end(self.axes_at(name)) for name, end in one.held.items()}
-        return {name: end for name, end in held.items() if end != FREE_END}, tuple(dict.fromkeys((*changed, *one.held)))
+        held = {name: end for name, end in held.items() if end != FREE_END}
+        return one.phase, held, tuple(dict.fromkeys((*changed, *one.held)))
+
+    def _strip_with(self, waves: int | None, held: dict[str, End], changed: tuple[str, ...]) -> Network:
+        """Return the network with the states of the phases of all stages, of which one holds."""
+        network = self._network(held, changed)
+        known = list(dict.fromkeys(stage.phase for stage in self.stages if stage.phase is not None))
+        if known and not network.floats:
+            raise ValueError("stages: phase: a network that is held does not shift; leave it out, or hold nothing")
+        phases = [replace(network.with_waves(count).phases[-1], holds=count == waves) for count in known]
+        return replace(network, phases=(*network.phases, *phases))
 
     def axes_at(self, joint: str) -> Mapping[str, Vector]:
         """Return width, normal and tangent of the first strip at a joint as drawn; the largest part of each is positive."""
@@ -283,7 +268,7 @@ class NetworkScene(StagedScene):
 
     def replacing(self, stage: int) -> tuple[str, ...]:
         """Return the names of the loads that replace reactions in a stage."""
-        held, changed = self._held(stage)
+        _, held, changed = self._held(stage)
         return tuple(number for name in changed for number in replacing(name, held.get(name)))
 
     def _network(self, held: dict[str, End], changed: tuple[str, ...]) -> Network:
@@ -328,7 +313,7 @@ class NetworkScene(StagedScene):
         if changed:  # a support that is let go has no numbers
             known = Network(sections, members, joints, held, loads, {}, *directions).known
             numbers = {name: value for name, value in numbers.items() if name in known}
-        return Network(sections, members, joints, held, loads, numbers, *directions, foundation_direction=where.foundation)
+        return Network(sections, members, joints, held, loads, numbers, *directions, self.phases, where.foundation)
 
     def _sections(self) -> dict[str, Section]:
         given = self.sections if self.material is None else {"strip": self.material}

@@ -240,8 +240,33 @@ class StagedScene(Scene):
     """What scenes share whose numbers are followed in stages."""
 
     @abstractmethod
-    def strip(self, stage: int = 1):
-        """Return the mechanics of a stage, from 1; raise ValueError for fields that do not fit."""
+    def _held(self, stage: int) -> tuple:
+        """Return what is held in a stage, and what has changed since the first one."""
+
+    @abstractmethod
+    def _strip_with(self, *held: Any) -> Any:
+        """Return the mechanics of what is held so."""
+
+    def strip(self, stage: int = 1) -> Any:
+        """Return the `ribbon_model.network.Network` of a stage, from 1: an `OpenStrip` of an open strip.
+
+        Raises
+        ------
+        ValueError
+            Fields that do not fit; one sentence.
+        """
+        held = self._held(stage)
+        if repr(held) not in self._strips:
+            try:
+                self._strips[repr(held)] = self._strip_with(*held)
+            except ValueError as error:
+                raise ValueError(f"stage {stage}: {error}" if held[-1] else str(error)) from error
+        return self._strips[repr(held)]
+
+    @functools.cached_property
+    def _strips(self) -> dict[str, Any]:
+        """The mechanics of all stages by what is held."""
+        return {}
 
     def check_stages(self, columns: Sequence[str]) -> None:
         """Raise ValueError for a stage that names what is not there; ``columns`` are others than the numbers."""
@@ -468,11 +493,6 @@ class OpenScene(StagedScene):
         numbers = {name: value / self.factor(name) for name, value in numbers_of("material", values).items()}
         return section_of(str(law), numbers, self.along)
 
-    @functools.cached_property
-    def _strips(self):
-        """The strips of all stages by what is held: first end, last end, and whether reactions have become loads."""
-        return {}
-
     def _held(self, stage: int) -> tuple[EndConfig, EndConfig, bool]:
         """Return what is held in a stage, and whether that has changed since the first one."""
         if stage == 1:
@@ -480,22 +500,6 @@ class OpenScene(StagedScene):
         one = self.stages[stage - 1]
         start, finish, changed = self._held(one.stage or stage - 1)
         return one.start or start, one.finish or finish, changed or bool(one.start or one.finish)
-
-    def strip(self, stage: int = 1):
-        """Return the `ribbon_model.open_strip.OpenStrip` of a stage, from 1.
-
-        Raises
-        ------
-        ValueError
-            Fields that do not fit; one sentence.
-        """
-        held = self._held(stage)
-        if held not in self._strips:
-            try:
-                self._strips[held] = self._strip_with(*held)
-            except ValueError as error:
-                raise ValueError(f"stage {stage}: {error}" if held[2] else str(error)) from error
-        return self._strips[held]
 
     def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
         """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
