@@ -43,7 +43,7 @@ MUTANTS = {
                  "2 * (1 + nu * kappa_n / bending)", "ribbon_model/test_linear.py"),
     "A3": Mutant("index counts pairs of modes once", "ribbon_model/stability.py", "entry.multiplicity * entry.negative",
                  "entry.negative", "ribbon_model/test_stability.py"),
-    "A4": Mutant("sign of dead forces", "ribbon_model/network.py",
+    "A4": Mutant("sign of dead forces", "ribbon_model/statement.py",
                  "value - part * getattr(p, number) * ends.along", "value + part * getattr(p, number) * ends.along",
                  "ribbon_model/test_open_strip.py"),
     "A5": Mutant("wrong component in angles_of", "ribbon_model/ends.py", "math.atan2(-d[2], d[8])", "math.atan2(-d[2], d[7])",
