@@ -225,12 +225,6 @@ def along(vector: Vector, components):
     return sum(a * x for a, x in zip(vector, components) if a != 0)
 
 
-def numbers_of(end: End) -> tuple[str, ...]:
-    """Return the names of the numbers that prescribe the last end: of place and frame, as far as they are held."""
-    place = [name for name, *parts in zip(PLACE, *end.held) if any(parts)] if end.held else []
-    return (*place, *(ANGLES if end.rotation != FREE else ()))
-
-
 def check_known(numbers: Mapping[str, float], known: tuple[str, ...]) -> None:
     """Raise ValueError for a number that nothing uses."""
     for name in numbers:

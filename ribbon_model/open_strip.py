@@ -143,7 +143,13 @@ class OpenStrip(Network):
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
         stroke = (STROKE,) if np.any(abs(along) > LOOSE) else ()
         roller = () if self.roller is None else ("roller",)
-        return (*ends.numbers_of(self.finish), *roller, *stroke, *forces, *(name for name in LOADS if name not in FORCES))
+        return (
+            *filter(None, self.numbers_at(LAST)),
+            *roller,
+            *stroke,
+            *forces,
+            *(name for name in LOADS if name not in FORCES),
+        )
 
     @functools.cached_property
     def _usual(self) -> dict[str, float]:

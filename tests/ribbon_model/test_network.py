@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from contin import ProblemError, solve, trace
 from ribbon_model.ends import CLAMP, FREE_END, HINGED, End, Support, hinge, product
@@ -200,6 +201,55 @@ def test_a_ring_under_pressure_until_it_touches():
             np.testing.assert_allclose(ring.reactions(last)["A"][0], 0, atol=1e-9)
             return
     pytest.fail("neither branch brings the ends together")
+
+
+# --- open strips, drawn anywhere ---------------------------------------------------------------------------------------------
+
+TURN, SHIFT = Rotation.from_rotvec([0.7, -0.4, 1.1]), (1.5, -4.0, 2.5)
+STRIPS = {
+    "a load at the tip": ({"finish": FREE_END}, "force_width", 6.0),
+    "weight": ({"finish": FREE_END, "weight_direction": (-1, 0, 0)}, "weight", 20.0),
+    "a moment": ({"finish": hinge(held=((1, 0, 0), (0, 1, 0)))}, "moment", 9.0),
+    "a foundation": ({"start": hinge(), "finish": hinge(held=((1, 0, 0), (0, 1, 0)))}, "force_tangent", -45.0),
+}
+
+
+def _redrawn(strip):
+    """The network of an open strip without stress, turned and moved."""
+
+    def turned(vector):
+        return tuple(TURN.apply(vector))
+
+    x, y, z, w = TURN.as_quat()
+    held = {
+        name: End(end.rotation, turned(end.axis), end.director, tuple(map(turned, end.held)))
+        for name, end in strip.held.items() if end.held or end.rotation != "free"
+    }  # fmt: skip
+    loads = {
+        name: Load([(joint, turned(axis), arm) for joint, axis, arm in load.forces], load.moments)
+        for name, load in strip.loads.items()
+    }  # fmt: skip
+    return Network(
+        {"strip": strip.section}, {"strip": Member(place=SHIFT, frame=(w, x, y, z))}, strip.joints, held, loads, strip.numbers,
+        turned(strip.weight_direction), foundation_direction=turned(strip.foundation_direction),
+    )  # fmt: skip
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("name", STRIPS)
+def test_an_open_strip_is_that_network_wherever_it_is_drawn(name):
+    """Bifurcations, their index, and reactions: the same equations on other axes."""
+    ends, follow, to = STRIPS[name]
+    numbers = {follow: 0.0} | ({"foundation": 90.0} if "foundation" in name else {})
+    strip = OpenStrip(_rod(B2=9.0, C=0.8), **ends, numbers=numbers)
+    other, sign = _redrawn(strip), int(math.copysign(1, to))
+    options = {"free": [follow], "limits": {follow: (min(0.0, to), max(0.0, to))}, "direction": sign}
+    here, there = trace(strip.first_point(), **options), trace(other.first_point()[0], **options)
+    expected = [(pytest.approx(value, rel=1e-9), change) for value, change in _changes(here, follow)]
+    assert _changes(there, follow) == expected != []
+    found, carried = strip.reactions(here[-1]), other.reactions(there[-1])["first"]
+    expected = [TURN.apply([found[f"start_{kind}_{axis}"] for axis in ("width", "normal", "tangent")]) for kind in "FM"]
+    np.testing.assert_allclose(carried, expected, atol=1e-8)
 
 
 # --- cuts -----------------------------------------------------------------------------------------------------------------
