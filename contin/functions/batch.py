@@ -236,11 +236,11 @@ class Recorded:
 
     def _along(self, places: Sequence[int], order: int) -> Sequence[int]:
         """Return the derivatives of operations along directions."""
-        tape, inputs = self.recording.tape, self.recording.inputs
-        for number in range(order):
-            along = {place: tape.input(("direction", number, slot)).place for slot, place in enumerate(inputs)}
-            places = derivatives.tangents(tape, places, along)
-        return places
+        if not order:
+            return places
+        tape, before = self.recording.tape, self._along(places, order - 1)
+        along = {place: tape.input(("direction", order - 1, slot)).place for slot, place in enumerate(self.recording.inputs)}
+        return self._once(("along", order, *before), lambda: derivatives.tangents(tape, before, along))
 
     def _inputs(self, directions: int = 0, weights: bool = False) -> Inputs:
         """Return where inputs are found: directions and weights stand behind v, outcomes and sizes behind p."""

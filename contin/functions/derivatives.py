@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from contin.functions.primitives import TABLE
 from contin.functions.tape import Number, Tape
@@ -64,9 +63,8 @@ class _Graph:
         if not any(reads[operand] for operand in operation.operands):
             return
         guarded = TABLE[operation.name].selects
-        for operand, partial in zip(operation.operands, partials_of(tape, place)):
-            if reads[operand] and partial is not None:
-                derivative = tape.number(partial).place
+        for operand, derivative in zip(operation.operands, partials_of(tape, place)):
+            if reads[operand] and derivative is not None:
                 if guarded and tape.value(derivative) is None:
                     self.guarded.add(derivative)
                 self._edge(operand, place, derivative)
@@ -135,11 +133,15 @@ class _Graph:
         return found
 
 
-def partials_of(tape: Tape, place: int) -> Any:
-    """Return the derivatives of an operation by its operands, recorded; None where one is zero everywhere."""
-    operation = tape.operations[place]
-    operands = [Number(tape, operand) for operand in operation.operands]
-    return TABLE[operation.name].partials(tape, operation.data, operands, Number(tape, place))
+def partials_of(tape: Tape, place: int) -> list[int | None]:
+    """Return the places of the derivatives of an operation by its operands; None where one is zero everywhere."""
+
+    def made() -> list[int | None]:
+        name, operands, data = tape.operations[place]
+        found = TABLE[name].partials(tape, data, [Number(tape, operand) for operand in operands], Number(tape, place))
+        return [None if each is None else tape.number(each).place for each in found]
+
+    return tape.kept(("partials", place, tape.decide is None), made)
 
 
 def tangents(tape: Tape, results: Sequence[int], along: Mapping[int, int]) -> list[int]:
@@ -172,9 +174,9 @@ def tangents(tape: Tape, results: Sequence[int], along: Mapping[int, int]) -> li
         total = zero
         for operand, partial in zip(operation.operands, partials_of(tape, place)):
             tangent = found.get(operand, zero)
-            if partial is None or tape.value(tangent) == 0:
+            if partial is None or tangent == zero:
                 continue
-            term = tape.at("product" if guarded else "mul", (tape.number(partial).place, tangent))
-            total = tape.at("add", (total, term))
+            term = tape.at("product" if guarded else "mul", (partial, tangent))
+            total = term if total == zero else tape.at("add", (total, term))
         found[place] = total
     return [found.get(place, zero) for place in results]

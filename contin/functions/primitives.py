@@ -78,6 +78,9 @@ class Primitive:
 
 def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
     """Return a NumPy function of numbers after ``data``. It warns; callers silence it, once for all operations."""
+    if function in (np.add, np.subtract, np.multiply):
+        plain = getattr(operator, function.__name__[:3])  # a tenth of the time for the same number
+        return lambda data, one, other: plain(one, other)
     return lambda data, *operands: float(function(*map(np.float64, operands)))
 
 
@@ -87,17 +90,17 @@ def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
 
 def _negated(tape: Recorder, place: int) -> int | None:
     """Return what an operation is the negative of."""
-    operation = tape.operations[place]
-    return operation.operands[0] if operation.name == "neg" else None
+    name, operands, _ = tape.operations[place]
+    return operands[0] if name == "neg" else None
 
 
 def _simple_add(tape: Recorder, places: Places) -> int | None:
     for one, other in (places, places[::-1]):
-        if tape.value(one) == 0:
+        name, operands, data = tape.operations[one]
+        if name == "constant" and data == 0:
             return other
-        negated = _negated(tape, one)
-        if negated is not None:
-            return tape.at("sub", (other, negated))
+        if name == "neg":
+            return tape.at("sub", (other, operands[0]))
     return None
 
 
@@ -115,16 +118,17 @@ def _simple_sub(tape: Recorder, places: Places) -> int | None:
 
 def _simple_times(tape: Recorder, places: Places, name: str = "mul") -> int | None:
     for one, other in (places, places[::-1]):
-        value = tape.value(one)
+        kind, operands, value = tape.operations[one]
+        if kind == "neg":
+            return tape.at("neg", (tape.at(name, (operands[0], other)),))
+        if kind != "constant":
+            continue
         if value == 0 and tape.decide is None:
             return tape.constant(0.0)
         if value == 1:
             return other
         if value == -1:
             return tape.at("neg", (other,))
-        negated = _negated(tape, one)
-        if negated is not None:
-            return tape.at("neg", (tape.at(name, (negated, other)),))
     return None
 
 

@@ -10,6 +10,7 @@ Each instruction is a row of five whole numbers: code, target, and up to three o
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -172,17 +173,17 @@ class _Lowering:
     def _ordered(self) -> list[int]:
         """Return the operations that vary, each result's just before it: what is needed late is computed late."""
         found: list[int] = []
-        seen = set()
+        left, operations = [bool(each) for each in self.varies], self.tape.operations
         for result, _ in self.results:
-            stack = [(result, False)]
+            stack = [result]
             while stack:
-                place, done = stack.pop()
-                if done:
-                    found.append(place)
-                elif self.varies[place] and place not in seen:
-                    seen.add(place)
-                    stack.append((place, True))
-                    stack.extend((operand, False) for operand in reversed(self.tape.operations[place].operands))
+                place = stack.pop()
+                if place < 0:
+                    found.append(~place)
+                elif left[place]:
+                    left[place] = False
+                    stack.append(~place)
+                    stack += operations[place].operands[::-1]
         return found
 
 
@@ -220,7 +221,9 @@ class _Stretch:
         self.free: list[int] = []
         self.most = first
         self.fused = self._fusible(places, moves)
-        self.left = Counter(operand for place in places if place not in self.fused for operand in self._operands(place))
+        self.product = {place: operand for operand, place in self.fused.items()}
+        self.taken = {place: self._operands(place) for place in places if place not in self.fused}
+        self.left = Counter(itertools.chain.from_iterable(self.taken.values()))
         for place in places:
             if place in self.fused:
                 continue
@@ -254,15 +257,13 @@ class _Stretch:
                     break
         return fused
 
-    def _operands(self, place: int) -> list[int]:
+    def _operands(self, place: int) -> Sequence[int]:
         """Return the operands of an operation, those of a product that it takes in included."""
-        found: list[int] = []
-        for operand in self.operations[place].operands:
-            if self.fused.get(operand) == place:
-                found += self.operations[operand].operands
-            else:
-                found.append(operand)
-        return found
+        product, operands = self.product.get(place), self.operations[place].operands
+        if product is None:
+            return operands
+        at = operands.index(product)
+        return *operands[:at], *self.operations[product].operands, *operands[at + 1 :]
 
     # --- registers -----------------------------------------------------------------------------------------------------
 
@@ -299,9 +300,9 @@ class _Stretch:
             self._root(place)
             name, given = "", []
         else:
-            product = next((operand for operand in operation.operands if self.fused.get(operand) == place), None)
+            product = self.product.get(place)
             name, given = self._plain(operation) if product is None else self._fused(operation, product)
-        for operand in self._operands(place):
+        for operand in self.taken[place]:
             self.left[operand] -= 1
             if self.left[operand] <= 0:
                 self._release(operand)
@@ -317,9 +318,14 @@ class _Stretch:
 
     def _plain(self, operation: Operation) -> tuple[str, list[int]]:
         """Return name and operands of an instruction that stands for one operation."""
-        name, operands = operation.name, operation.operands
-        if name == "least":
-            return "copy", [self._register(operands[0])]
+        name, operands, _ = operation
+        if name in _WITH_SCALAR:
+            a, b = operands
+            if b in self.scalar and a not in self.scalar:
+                return _WITH_SCALAR[name][0], [self._register(a), self.scalar[b]]
+            if a in self.scalar and b not in self.scalar:
+                return _WITH_SCALAR[name][1], [self._register(b), self.scalar[a]]
+            return name, [self._register(a), self._register(b)]
         if name in ("sum", "dot", "linear"):
             return name, self._list(operation)
         if name == "table":
@@ -328,12 +334,8 @@ class _Stretch:
             return name, [self._register(operands[0]), len(tables) - operation.data.numbers().size]
         if name == "polygamma":
             return name, [self._register(operands[0]), operation.data]
-        if name in _WITH_SCALAR:
-            a, b = operands
-            if b in self.scalar and a not in self.scalar:
-                return _WITH_SCALAR[name][0], [self._register(a), self.scalar[b]]
-            if a in self.scalar and b not in self.scalar:
-                return _WITH_SCALAR[name][1], [self._register(b), self.scalar[a]]
+        if name == "least":
+            return "copy", [self._register(operands[0])]
         return name, [self._register(operand) for operand in operands]
 
     def _list(self, operation: Operation) -> list[int]:

@@ -125,9 +125,9 @@ class Tape:
     def at(self, name: str, places: tuple[int, ...], data: object = None) -> int:
         """Do the same with the places of the operands; return the place of the result."""
         primitive = primitives.TABLE[name]
-        if primitive.constant is not None:
+        if places and primitive.constant is not None and self.operations[places[-1]].name == "constant":
             known = [self.value(place) for place in places]
-            if places and None not in known:
+            if None not in known:
                 with np.errstate(all="ignore"):
                     return self.constant(primitive.constant(data, *known))
         if primitive.simplify is not None:
@@ -148,14 +148,16 @@ class Tape:
 
     def reading(self, places: Iterable[int], sources: Iterable[int]) -> list[bool]:
         """Return for every operation up to the last of ``places`` whether it depends on one of ``sources``."""
-        last = max(places, default=-1)
+        last, operations = max(places, default=-1), self.operations
         depends = [False] * (last + 1)
         for source in sources:
             if source <= last:
                 depends[source] = True
-        for place, operation in enumerate(self.operations[: last + 1]):
-            if not depends[place]:
-                depends[place] = any(depends[operand] for operand in operation.operands)
+        for place in range(last + 1):
+            for operand in operations[place][1]:
+                if depends[operand]:
+                    depends[place] = True
+                    break
         return depends
 
     def needed(self, places: Iterable[int]) -> list[int]:
