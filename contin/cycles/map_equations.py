@@ -18,11 +18,51 @@ from contin.events.arc import SpecialPoint
 from contin.events.dips import NO_MULTIPLIER
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Batch
+from contin.functions.origin import source
 from contin.levels import DOUBLED
 from contin.linalg.blocks import MANY
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.statement import ROUNDS, rounds_of
+
+
+class _Pointwise:
+    """A batch for each point."""
+
+    #: What is frozen is recorded.
+    interpreted = None
+
+    def __init__(self, batches: Sequence[Batch]) -> None:
+        self.batches, self.count, self.columns = batches, batches[0].count, batches[0].columns
+
+    def values(self, *given: Any) -> Array:
+        """Return values at all points; the others, as of a `Batch`, likewise."""
+        return np.concatenate(self._each("values", given))
+
+    def jacobian(self, *given: Any) -> list[Array]:
+        return [np.concatenate(parts) for parts in zip(*self._each("jacobian", given))]
+
+    def entries(self, *given: Any) -> list[Array]:
+        return [np.concatenate(parts) for parts in zip(*self._each("entries", given))]
+
+    def along(self, *given: Any) -> Array:
+        return np.concatenate(self._each("along", given))
+
+    def bent(self, *given: Any) -> Array:
+        return np.concatenate(self._each("bent", given))
+
+    def _each(self, name: str, given: Any) -> list[Any]:
+        t, u, v, p, *rest = given
+
+        def at(item: Any, k: int) -> Any:
+            if isinstance(item, list):
+                return [at(each, k) for each in item]
+            return item[k : k + 1] if isinstance(item, np.ndarray) else item
+
+        return [
+            getattr(batch, name)(t[k : k + 1], u[k : k + 1], v, p, *(at(item, k) for item in rest))
+            for k, batch in enumerate(self.batches)
+        ]
 
 
 class MapSystem(OfCycles, Algebraic):
@@ -104,9 +144,38 @@ class MapSystem(OfCycles, Algebraic):
     _functions = ("map",)
 
     @functools.cached_property
-    def _residual(self) -> Batch:
-        """The map."""
-        return self.problem.batch("map")
+    def _residual(self) -> Any:
+        """The map; where outcomes are frozen, those of each point."""
+        return self._frozen(0) if self.sides.size else self.problem.batch("map")
+
+    @functools.cached_property
+    def _deciding(self) -> Any:
+        return self._frozen(1)
+
+    def _frozen(self, which: int) -> Any:
+        every = [self.problem.batch("map").frozen(self._free, sides)[which] for sides in self.sides.reshape(self.rounds, -1)]
+        return every[0] if self.rounds == 1 else _Pointwise(every)
+
+    @functools.cached_property
+    def conditions(self) -> int:  # type: ignore[override]
+        """Their number, at all points."""
+        return self.rounds * len(self.problem.batch("map").conditions(self._free)) if type(self) is MapSystem else 0
+
+    def written(self, k: int) -> str:
+        """Return what the user has written for a condition, and at which point."""
+        batch = self.problem.batch("map")
+        origins = batch.conditions(self._free)
+        point = f" at point {k // len(origins) + 1}" if self.rounds > 1 else ""
+        return source(batch, origins[k % len(origins)]) + point
+
+    def numbers(self, x: Array) -> tuple[Array, Array]:
+        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
+        values, slopes = self._deciding.jacobian(*self._terms[0].inputs(x), self._deciding.columns(self._free))
+        found = np.zeros((*values.shape, self.size))
+        found[..., self.state_size :] = slopes[:, :, self._n :]
+        for at, each in enumerate(slopes):
+            found[at, :, at * self._n : (at + 1) * self._n] = each[:, : self._n]
+        return values.ravel(), found.reshape(-1, self.size)
 
     def _by_x(self, slopes: Array) -> Array:
         first, last = slopes[:, : self._n].ravel(), np.add.reduce(slopes[:, self._n :])
@@ -114,7 +183,7 @@ class MapSystem(OfCycles, Algebraic):
 
     def _images(self, x: Array, states: Array) -> Array:
         """Return f at states (K, n), shape (K, n)."""
-        return self._residual.values(np.zeros(len(states)), states, self._none, self.all_parameters(x))
+        return self.problem.batch("map").values(np.zeros(len(states)), states, self._none, self.all_parameters(x))
 
     def _missed(self, x: Array, images: Array) -> Array:
         """Return f(u_j) - u_(j+1), shape (equations,), of the images f(u_j); the last one gains whole rounds of angles."""
@@ -163,7 +232,7 @@ class MapSystem(OfCycles, Algebraic):
 
     def residual(self, x: Array) -> Array:
         """Return f(u_j) - u_(j+1), shape (equations,)."""
-        return self._missed(x, self._images(x, self.states(x)))
+        return self._missed(x, self._terms[0].batch.values(*self._terms[0].inputs(x)))
 
     def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""

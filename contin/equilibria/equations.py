@@ -269,7 +269,7 @@ class Algebraic(Spectral, System):
 
     @functools.cached_property
     def conditions(self) -> int:  # type: ignore[override]
-        """Their number; none of a map, and with a given Jacobian."""
+        """Their number; none with a given Jacobian."""
         taken = type(self) is Algebraic and self.problem.jacobian is None
         return len(self.problem.batch("residual").conditions(self._free)) if taken else 0
 
@@ -464,7 +464,7 @@ class Algebraic(Spectral, System):
     def _with(self, **changes: object) -> Self:
         """Return the same with other free parameters, parameters or scales; with frozen outcomes if these are the same."""
         other = super()._with(**changes)
-        other.sides = self.sides if other.free == self.free else other.sides
+        other.sides = self.sides if (other.free, other.size) == (self.free, self.size) else other.sides
         return other
 
     def carrier(self, other: Discretization) -> Carrier:

@@ -113,6 +113,22 @@ def test_numbers_that_pass_zero_twice_in_a_step(depth):
     assert corners(branch) == ([(-root, "goes on"), (root, "goes on")] if depth > 0 else [])
 
 
+def test_border_collisions_of_maps():
+    """A skew tent: its fixed point passes the tip, where the multiplier goes from 1/2 to -3/2. Of x -> a - x^2 + .3 |x - .2|
+    a cycle of two meets .2 where f(f(.2)) = .2, f(.2) = a - .04: at a = 1.14, (.3 a - .072) - (a - .04)^2 + a = .2."""
+    tent = contin.MapProblem(lambda u, p: (p.a + (0.5 * u.x if u.x < 0 else -1.5 * u.x),), ["x"], {"a": -1.0})
+    branch = trace(solve(tent, [-2.0]), free=["a"], limits={"a": (-1, 1)})
+    assert corners(branch) == [(0, "goes on")] and branch.labelled("BC")[0].details.unstable == (0, 1)
+    assert branch[-1]["x"] == pytest.approx(0.4) and branch[-1]["a"] == 1
+    bent = contin.MapProblem(lambda u, p: (p.a - u.x**2 + 0.3 * abs(u.x - 0.2),), ["x"], {"a": 1.1})
+    branch = trace(solve(bent, [0.25, 1.05], {"rounds": 2.0}), free=["a"], limits={"a": (0.5, 1.2)})
+    (corner,) = branch.labelled("BC")
+    assert (
+        abs(corner["a"] - 1.14) <= corner.errors["a"] + 1e-15 and corner.details.kind == "fold" and "at point 1" in corner.name
+    )
+    assert abs(corner.x[0] - 0.2) < 1e-12 and [point.label for point in branch if point.label][-2:] == ["LP", "EP"]
+
+
 @pytest.mark.parametrize("guess", [0.0, 3.0])
 def test_a_solution_beyond_a_jump_is_not_made_up(guess):
     """x + 1 for x > 1 jumps over 1.5: Newton's method goes to and fro; from either side the way ends at the jump."""
