@@ -108,6 +108,7 @@ class Collocation(System):
         self.tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
         self._n = len(self.problem.state_names)
         self._take_mesh(np.array(mesh, dtype=float))
+        self._complete()
 
     def _take_mesh(self, mesh: Array) -> None:
         """Set all that depends on the mesh, and forget what was computed on another one."""

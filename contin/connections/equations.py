@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -16,7 +16,6 @@ from contin.collocation.newton import Values
 from contin.collocation.projection import Projections, projections
 from contin.connections.branches import homoclinic_points, named, own_test_of
 from contin.core.differences import Numbers, alike, classes, shares, subsets
-from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.defining.special_points import EventCurve
 from contin.draws import generator
@@ -27,7 +26,7 @@ from contin.functions.origin import Place, not_finite
 from contin.levels import APART
 from contin.linalg.blocks import Factors, Share, share
 from contin.problems.angles import WINDING, check_windings
-from contin.problems.statement import TIME, Statement
+from contin.problems.statement import TIME
 
 #: What is computed when it is first asked for, and depends on the reference.
 _OF_A_REFERENCE = ("_known", "_complements")
@@ -70,12 +69,8 @@ class ConnectionCollocation(Collocation):
 
     problem: Any
 
-    def __init__(
-        self, problem: Statement, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-        parameters: Mapping[str, float], scales: Scales | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(problem, mesh, degree, free, parameters, scales)
-        check_windings(self.problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
+    def _complete(self) -> None:
+        check_windings(self.problem.angles, self.free, self._values)
 
     def _take_mesh(self, mesh: Array) -> None:
         super()._take_mesh(mesh)

@@ -175,6 +175,14 @@ class System(Discretization):
         #: Sizes of the free parameters.
         self.free_scales: Array = self.scales.parameters[self._free]
 
+    def _complete(self) -> None:
+        """Set what a kind of problem adds; called when the rest is set."""
+
+    @property
+    def _values(self) -> dict[str, float]:
+        """Values of all parameters by name; those of the free ones are not used."""
+        return dict(zip(self.problem.parameters, map(float, self.parameters)))
+
     @property
     def _rows(self) -> tuple[tuple[str, int], ...]:
         """Names and numbers of the equations that have sizes of their own."""
@@ -279,13 +287,12 @@ class System(Discretization):
 
     def _with(self, **changes: object) -> Self:
         """Return the same with other free parameters, parameters or scales."""
-        values = dict(zip(self.problem.parameters, self.parameters))
-        given: dict[str, Any] = {"free": self.free, "parameters": values, "scales": self.scales, **changes}
+        given: dict[str, Any] = {"free": self.free, "parameters": self._values, "scales": self.scales, **changes}
         return type(self)(self.problem, *self._grid, **given)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the same problem with other values of parameters that are not free."""
-        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
+        return self._with(parameters=self._values | dict(values))
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
         """Return the same problem with other free parameters (values from x), and x for it."""

@@ -19,7 +19,6 @@ from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.spectral import on_circle
 from contin.core.step import COLLAPSED, Reason, Stop
-from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.cycles.curves import DoublingCurve, TorusCurve, events_on_folds
 from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_inside, shrunk
@@ -106,22 +105,14 @@ class PeriodicCollocation(OfCycles, Collocation):
     #: for 15, and all special points of the tests' cycles are found.
     aims = 0.7, 0.05
 
-    def __init__(
-        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-        parameters: Mapping[str, float], scales: Scales | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(problem, mesh, degree, free, parameters, scales)
+    def _complete(self) -> None:
+        problem, values = self.problem, self._values
         self.order = problem.order
-        self._turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
-        values = dict(zip(problem.parameters, map(float, self.parameters)))
+        #: The matrix S of the symmetry u(1) = S u(0), of states divided by their sizes; the identity where there is none.
+        self.turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
         check_windings(problem.angles, self.free, values)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
         self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
-
-    @property
-    def turn(self) -> Array:
-        """The matrix S of the symmetry u(1) = S u(0), of states divided by their sizes; the identity where there is none."""
-        return self._turn
 
     def duration(self, x: Array) -> float:
         """Return the period."""
@@ -376,14 +367,10 @@ class ForcedCollocation(PeriodicCollocation):
 
     autonomous = False
 
-    def __init__(
-        self, problem: Any, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-        parameters: Mapping[str, float], scales: Scales | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(problem, mesh, degree, free, parameters, scales)
-        values = dict(zip(self.problem.parameters, map(float, self.parameters)))
-        self.rounds = rounds_of(self.free, values)
-        problem.duration(values)
+    def _complete(self) -> None:
+        super()._complete()
+        self.rounds = rounds_of(self.free, self._values)
+        self.problem.duration(self._values)
 
     def is_doubled(self, x: Array) -> bool:
         """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
@@ -463,11 +450,8 @@ class CycleCollocation(PeriodicCollocation):
         The cycle v; zero where `with_reference` has not set it.
     """
 
-    def __init__(
-        self, problem: object, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-        parameters: Mapping[str, float], scales: Scales | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(problem, mesh, degree, free, parameters, scales)
+    def _complete(self) -> None:
+        super()._complete()
         self._refer(np.zeros(self.size))
 
     def _take_mesh(self, mesh: Array) -> None:

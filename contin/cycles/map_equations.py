@@ -10,7 +10,6 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.spectral import on_circle
-from contin.core.system import Scales
 from contin.cycles.equations import OfCycles, is_opposite, is_pair
 from contin.cycles.normal_forms import MOST, MapForm
 from contin.equilibria.equations import Algebraic
@@ -91,16 +90,13 @@ class MapSystem(OfCycles, Algebraic):
     #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds; none of them is always 1.
     order, autonomous = 1, False
 
-    def __init__(
-        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None, scales: Scales | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(problem, free, parameters)
-        values = dict(zip(problem.parameters, map(float, self.parameters)))
+    def _complete(self) -> None:
+        problem, values = self.problem, self._values
         self.rounds = rounds_of(self.free, values)
         check_windings(problem.angles, self.free, values)
         #: What the angles gain over the cycle, shape (n,).
         self.gain = gain(problem.angles, problem.state_names, values)
-        self._n = len(problem.state_names)
+        self._n = self.state_size
         self.state_size = self.equations = self._n * self.rounds
         self.size = self.state_size + len(self.free)
         self.weights = np.append(np.full(self.state_size, 1 / self.rounds), np.ones(len(self.free)))

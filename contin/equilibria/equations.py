@@ -35,6 +35,7 @@ from contin.levels import CERTAIN, CORRECTED, LOCATED
 from contin.linalg.blocks import MANY, Factors
 from contin.linalg.matrices import DenseFactors, SparseFactors, eigenvalues, nearest, rightmost
 from contin.problems.angles import whole_rounds
+from contin.problems.statement import Statement
 
 
 class _Given(Protocol):
@@ -189,14 +190,16 @@ class Algebraic(Spectral, System):
     gain: Array | None = None
 
     def __init__(
-        self, problem: Any, free: Sequence[str], parameters: Mapping[str, float] | None = None, scales: Scales | None = None,
+        self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float] | None = None,
+        scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, free, parameters or {}, scales)
-        self.state_size = len(problem.state_names)
+        self.state_size = len(self.problem.state_names)
         self.size = self.state_size + len(self.free)
-        self.equations = problem.equation_size
+        self.equations = self.problem.equation_size
         self.weights = np.ones(self.size)
         self._none = np.empty((0, self.state_size))  # the absent second state of functions of one point
+        self._complete()
 
     @property
     def _rows(self) -> tuple[tuple[str, int], ...]:
