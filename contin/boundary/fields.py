@@ -36,6 +36,7 @@ from contin.arrays import Array, ComplexArray, Function, Numbers
 from contin.boundary.system import Collocation
 from contin.core.labels import Label
 from contin.core.spectral import Spectral
+from contin.core.system import Inputs
 from contin.core.trial import Event
 from contin.defining.critical import HopfCurve
 from contin.draws import generator
@@ -246,11 +247,16 @@ class Fields(Spectral, Collocation):
 
     def _rates(self, x: Array) -> Array:
         """Return the entries of M in the rows with rates at the Gauss points, (N d, R, n), in sizes of the states."""
-        n, batch, states = self._n, self.problem.batch("rates"), self.states_at_gauss_points(x)
-        at = self.gauss_times, np.hstack([states, np.zeros_like(states)]), np.empty((0, 2 * n)), self.all_parameters(x)
+        n, batch = self._n, self.problem.batch("rates")
+        at = self._with_rates(x, np.zeros((self.gauss_times.size, n)))
         found = batch.jacobian(*at, batch.columns((), range(n, 2 * n)))[1]
         sizes = self.scales.states
         return found * sizes / sizes[self.problem.rate_rows][:, None]
+
+    def _with_rates(self, x: Array, rates: Array) -> Inputs:
+        """Return what the functions of states and rates (N d, n) at the Gauss points are called with."""
+        both = np.hstack([self.states_at_gauss_points(x), rates])
+        return self.gauss_times, both, np.empty((0, both.shape[1])), self.all_parameters(x)
 
     @property
     def moving_states(self) -> Array:
@@ -260,8 +266,7 @@ class Fields(Spectral, Collocation):
     def rates_gradient(self, x: Array, w: Array, v: Array) -> Array:
         """Return the derivatives of w.B v by x, shape (size,), for w (equations,) and v (size,)."""
         n, batch, rows, sizes = self._n, self.problem.batch("rates"), self.problem.rate_rows, self.scales.states
-        both = np.hstack([self.states_at_gauss_points(x), self.states_at_gauss_points(v)])
-        at = self.gauss_times, both, np.empty((0, 2 * n)), self.all_parameters(x)
+        at = self._with_rates(x, self.states_at_gauss_points(v))
         slopes = batch.jacobian(*at, batch.columns(self._free, range(n)))[1] / sizes[rows][:, None]
         weights = self._h_points * w[: self._inner].reshape(-1, n)[:, rows]
         return self._to_nodes(np.einsum("qr,qrb->qb", weights, slopes) * np.append(sizes, self.free_scales))
@@ -273,12 +278,11 @@ class Fields(Spectral, Collocation):
         ------
         ProblemError
         """
-        batch, states, sizes = self.problem.batch("rates"), self.states_at_gauss_points(x), self.scales.states
-        rates = generator("fields").uniform(1, 2, states.shape)
+        batch, sizes = self.problem.batch("rates"), self.scales.states
+        rates = generator("fields").uniform(1, 2, (self.gauss_times.size, self._n))
 
         def values(w: Array) -> Array:
-            at = self.gauss_times, np.hstack([states, w * sizes]), np.empty((0, 2 * self._n)), self.all_parameters(x)
-            return batch.values(*at) / sizes[self.problem.rate_rows]
+            return batch.values(*self._with_rates(x, w * sizes)) / sizes[self.problem.rate_rows]
 
         there, rest = values(rates), values(0 * rates)
         linear = np.einsum("qrb,qb->qr", self._rates(x), rates)

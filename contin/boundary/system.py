@@ -299,12 +299,12 @@ class Collocation(System):
 
     def _inside(self, x: Array) -> Inputs:
         """Return where functions of t are evaluated: at the Gauss points."""
-        return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
+        return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self.scaled_parameters(x)
 
     def _at_ends(self, x: Array) -> Inputs:
         """Return where boundary conditions are evaluated."""
         u = self._scaled_states(x)
-        return _TIME, u[:1], u[-1:], self._scaled_parameters(x)
+        return _TIME, u[:1], u[-1:], self.scaled_parameters(x)
 
     # --- F and F_x -----------------------------------------------------------------------------------------------
 
@@ -476,10 +476,6 @@ class Collocation(System):
     def newton_error(self, x: Array, factors: Factors) -> float:
         """Return what Newton's method or round-off has left, measured in the same way."""
         return self.defect.left_by_newton(x, self.residual(x), factors)
-
-    def scaled_parameters(self, x: Array) -> Array:
-        """Return all parameters divided by their sizes."""
-        return self._scaled_parameters(x)
 
     def field_values(self, times: Array, points: Array, p: Array) -> Array:
         """Return right-hand side and integrands of conditions, shape (K, n + their number).

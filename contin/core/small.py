@@ -77,7 +77,7 @@ def equations_of(system: Any) -> Equations | None:
     rates = system.scales.rows["residual"] / system.scales.states if count == n else np.ones(count)
     return Equations(
         batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
-        np.zeros(count) if gain is None else gain, int(gain is not None), system._scaled_parameters(np.zeros(size)),
+        np.zeros(count) if gain is None else gain, int(gain is not None), system.scaled_parameters(np.zeros(size)),
         system._free,
         np.zeros(1),
         np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),

@@ -228,7 +228,7 @@ class System(Discretization):
         p[self._free] = x[self.state_size :] * self.free_scales
         return p
 
-    def _scaled_parameters(self, x: Array) -> Array:
+    def scaled_parameters(self, x: Array) -> Array:
         """Return all parameters divided by their sizes."""
         p = self._fixed.copy()
         p[self._free] = x[self.state_size :]

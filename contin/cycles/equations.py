@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -59,6 +58,14 @@ class OfCycles(Discretization):
     def is_cycle(self) -> bool:
         """Yes."""
         return True
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
+        return False
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None near -1."""
+        return None if is_opposite(frequency) else ("TR", "torus")
 
     def unstable(self: Any, x: Array) -> int:
         """Return the number of unstable multipliers, without one that is always 1."""
@@ -238,7 +245,7 @@ class PeriodicCollocation(OfCycles, Collocation):
         Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
         """
         n, times = self._n, np.zeros(len(points)) if self.autonomous else self.gauss_times
-        given = times, points, np.empty((0, n)), self._scaled_parameters(x)
+        given = times, points, np.empty((0, n)), self.scaled_parameters(x)
         return self._field.jacobian(*given, self._field.columns([]))[1][:, :n]
 
     def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
@@ -316,20 +323,12 @@ class PeriodicCollocation(OfCycles, Collocation):
         finer._monodromies[threading.get_ident()] = monodromy_of(finer, math.inf)
         return finer._computed(carry(x))
 
-    def is_drifted(self, x: Array) -> bool:
-        """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
-        return False
-
     def whole_round(self, values: ComplexArray) -> ComplexArray:
         """Return the logarithms of the multipliers over the whole period, n times those over one n-th of it."""
         if self.order == 1:
             return values
         angles = self.order * values.imag
         return self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
-
-    @abstractmethod
-    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
-        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
 
     # --- what is known of its branches --------------------------------------------------------------------------
 
@@ -376,10 +375,6 @@ class ForcedCollocation(PeriodicCollocation):
         """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
         return self.rounds % 2 == 0 and super().is_doubled(x)
 
-    def with_reference(self, x: Array) -> Self:
-        """Return the same: nothing needs a reference."""
-        return self
-
     @functools.cached_property
     def breaks(self) -> Array:
         """Places on the unit interval where the forcing has jumps or corners that no free parameter moves: t = s T(p)."""
@@ -388,10 +383,6 @@ class ForcedCollocation(PeriodicCollocation):
         here, there = (breaks_of(self.problem.batch("field"), self.problem.domain, p) for p in (self.parameters, moved))
         still = np.abs(here[:, None] - there) <= LOCATED if there.size else np.zeros((here.size, 1), dtype=bool)
         return here[still.any(axis=1)]
-
-    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
-        """Return label and name of a torus bifurcation; None near a double multiplier -1."""
-        return None if is_opposite(frequency) else ("TR", "torus")
 
     # --- what is known of its branches --------------------------------------------------------------------------
 
@@ -517,11 +508,11 @@ class CycleCollocation(PeriodicCollocation):
         sqrt(e).
         """
         trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
-        return None if frequency**2 < _SPLIT * trivial or is_opposite(frequency) else ("TR", "torus")
+        return None if frequency**2 < _SPLIT * trivial else super().crossing(x, frequency)
 
     def rates(self, x: Array, points: Array) -> Array:
         """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
-        return self.field_values(np.zeros(len(points)), points, self._scaled_parameters(x))[:, : self._n]
+        return self.field_values(np.zeros(len(points)), points, self.scaled_parameters(x))[:, : self._n]
 
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""

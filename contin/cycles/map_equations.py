@@ -10,7 +10,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.spectral import on_circle
-from contin.cycles.equations import OfCycles, is_opposite, is_pair
+from contin.cycles.equations import OfCycles, is_pair
 from contin.cycles.normal_forms import MOST, MapForm
 from contin.equilibria.equations import Algebraic
 from contin.events.arc import SpecialPoint
@@ -110,10 +110,6 @@ class MapSystem(OfCycles, Algebraic):
     def is_sparse(self) -> bool:
         """The matrix is kept sparse: the cycle is long, and few of the entries are not zero."""
         return self.state_size >= MANY and self.rounds >= MANY // self._n
-
-    def is_drifted(self, x: Array) -> bool:
-        """Return whether the multipliers are in doubt: they never are."""
-        return False
 
     # --- states --------------------------------------------------------------------------------------------------
 
@@ -300,10 +296,6 @@ class MapSystem(OfCycles, Algebraic):
     def is_symmetric(self, x: Array) -> bool:
         """Return False: F_u couples the points of a cycle."""
         return False
-
-    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
-        """Return label and name of a torus bifurcation; None near a double multiplier -1."""
-        return None if is_opposite(frequency) else ("TR", "torus")
 
     def is_doubled(self, x: Array) -> bool:
         """Return whether a cycle goes twice round one of half its rounds, up to the square root of round-off."""

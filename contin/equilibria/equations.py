@@ -248,7 +248,7 @@ class Algebraic(Spectral, System):
 
         def inputs(x: Array) -> Inputs:
             u = np.ascontiguousarray(self._scaled_states(x)[:count])
-            return np.zeros(len(u)), u, self._none, self._scaled_parameters(x)
+            return np.zeros(len(u)), u, self._none, self.scaled_parameters(x)
 
         return Term(self, batch, inputs, np.ravel, lambda w: w.reshape(-1, batch.count), self._by_x)
 
