@@ -22,7 +22,7 @@ from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolat
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
-from contin.core.system import Inputs, Scales, System, Term
+from contin.core.system import Composed, Inputs, Scales, Term
 from contin.core.trial import Event
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
@@ -51,7 +51,7 @@ def _NONE(n: int) -> Array:
     return np.empty((0, n))
 
 
-class Collocation(System):
+class Collocation(Composed):
     """A problem discretized on a mesh: what the continuation loop works on.
 
     A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,

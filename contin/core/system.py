@@ -20,6 +20,7 @@ import numpy as np
 from contin import errors as checks
 from contin.arrays import Array, Indices, Pattern
 from contin.collocation.mesh import MeshControl
+from contin.core.differences import derivative
 from contin.core.protocol import Carrier, Discretization
 from contin.draws import ASIDE
 from contin.errors import ProblemError
@@ -280,42 +281,16 @@ class System(Discretization):
         """Return the same with the rounds that angles make in x, unless they are given, and a continuous x."""
         return self, x
 
-    # --- the same with other parameters and sizes -----------------------------------------------------------------
-
-    #: Mesh and degree, of kinds that have them.
-    _grid: tuple[Any, ...] = ()
-
-    def _with(self, **changes: object) -> Self:
-        """Return the same with other free parameters, parameters or scales."""
-        given: dict[str, Any] = {"free": self.free, "parameters": self._values, "scales": self.scales, **changes}
-        return type(self)(self.problem, *self._grid, **given)
-
-    def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """Return the same problem with other values of parameters that are not free."""
-        return self._with(parameters=self._values | dict(values))
-
-    def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
-        """Return the same problem with other free parameters (values from x), and x for it."""
-        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other = self._with(free=free, parameters=values)
-        return other, other.pack(self.states(x), values)
-
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
-        rows = {name: np.ones(count) for name, count in self._rows}
-        scaled = self._with(scales=Scales(states, parameters, rows))
-        z = self.carrier(scaled)(x)
-        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
-        return self._with(scales=Scales(states, parameters, found)), z
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.
+
+        Kinds of system that have no scales return themselves.
+        """
+        return self, x
 
     def without_scales(self, x: Array) -> tuple[Self, Array]:
         """Return the same problem in the user's units, and x for it."""
-        other = self._with(scales=None)
-        return other, self.carrier(other)(x)
-
-    @abstractmethod
-    def _row_sizes(self, x: Array) -> dict[str, Array]:
-        """Return the largest entries of F_x in the rows that have sizes of their own."""
+        return self, x
 
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""
@@ -332,20 +307,91 @@ class System(Discretization):
             unit = np.zeros(self.size)
             unit[at] = self.free_scales[at - self.state_size]
             return unit
-        if name in self.integrated:
-            term, at = self._means, self.integrated.index(name)
-            return term.by_x(term.weights(self._unit(name))[:, at, None] * term.slopes(x, term.columns)[:, at])
         return np.zeros(self.size) if name in self.problem.parameters else None
+
+    @abstractmethod
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
+
+        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
+        differences of `transposed_product`.
+        """
+        longest = np.abs(v).max(initial=0.0)
+        if not longest:
+            return np.zeros(self.size)
+        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
-        return self._means.bent(x, self._unit(name), v) if name in self.integrated else np.zeros(self.size)
+        longest = np.abs(v).max(initial=0.0)
+        if name in self.problem.parameters or not longest:
+            return np.zeros(self.size)
+        return derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
 
-    def _unit(self, name: str) -> Array:
-        """Return the weights of the functionals in one of them."""
-        return np.array([float(other == name) for other in self.integrated])
+    def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
+        """Return what a function returns, and the estimated relative error of the derivatives that it took.
 
-    # --- the functions of the statement ---------------------------------------------------------------------------
+        That is round-off, or the error of differences: of these alone, whatever was computed before.
+        """
+        batches = [batch.interpreted for batch in self._evaluated if batch.interpreted is not None]
+        before = [batch.error for batch in batches]
+        for batch in batches:
+            batch.error = 0.0
+        found = function()
+        error = max([LAST_PLACES, *(batch.error for batch in batches)])
+        for batch, known in zip(batches, before):
+            batch.error = max(batch.error, known)
+        return found, error
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The functions that the equations are made of."""
+        return ()
+
+    def _wide(self, v: Array, states: Array) -> Array:
+        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v.
+
+        v has the shape (size,) or (K, size), or no free parameters.
+        """
+        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
+        wide[:, : states.shape[1]] = states
+        wide[:, states.shape[1] + self._free[: v.shape[-1] - self.state_size]] = v[..., self.state_size :]
+        return wide
+
+    def _scaled_states(self, x: Array) -> Array:
+        """Return the states divided by their sizes, a view of x, shape (K, n)."""
+        return x[: self.state_size].reshape(-1, self.scales.states.size)
+
+    @abstractmethod
+    def refined(self) -> tuple[System, Carrier] | None:
+        """Return the same problem with every interval halved, and the carrier; None without a mesh."""
+
+    @abstractmethod
+    def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
+        """Return the same problem on a better mesh for x, and the carrier; None where there is no need."""
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[System, Carrier] | None:
+        """Return the same problem on a mesh with the places of `switching` among its points; None where there is no need."""
+        return None
+
+    @abstractmethod
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+
+    @abstractmethod
+    def with_parameters(self, values: Mapping[str, float]) -> System:
+        """Return the same problem with other values of parameters that are not free."""
+
+    @abstractmethod
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
+        """Return the same problem with other free parameters (values from x), and x for it."""
+
+
+class Composed(System):
+    """A system whose equations are made of terms: it has their derivatives, and scales."""
 
     #: Names of the functions of the terms.
     _functions: tuple[str, ...] = ()
@@ -401,47 +447,54 @@ class System(Discretization):
                 found[:, k] += term.rows(slopes[:, :, k])
         return found
 
-    def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
-        """Return what a function returns, and the estimated relative error of the derivatives that it took.
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a column (a parameter or functional) by x, shape (size,); None where they are not known."""
+        if name not in self.integrated:
+            return super().column_gradient(x, name)
+        term, at = self._means, self.integrated.index(name)
+        return term.by_x(term.weights(self._unit(name))[:, at, None] * term.slopes(x, term.columns)[:, at])
 
-        That is round-off, or the error of differences: of these alone, whatever was computed before.
-        """
-        batches = [batch.interpreted for batch in self._evaluated if batch.interpreted is not None]
-        before = [batch.error for batch in batches]
-        for batch in batches:
-            batch.error = 0.0
-        found = function()
-        error = max([LAST_PLACES, *(batch.error for batch in batches)])
-        for batch, known in zip(batches, before):
-            batch.error = max(batch.error, known)
-        return found, error
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        return self._means.bent(x, self._unit(name), v) if name in self.integrated else super().column_bent(x, name, v)
 
-    def _wide(self, v: Array, states: Array) -> Array:
-        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v.
+    def _unit(self, name: str) -> Array:
+        """Return the weights of the functionals in one of them."""
+        return np.array([float(other == name) for other in self.integrated])
 
-        v has the shape (size,) or (K, size), or no free parameters.
-        """
-        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
-        wide[:, : states.shape[1]] = states
-        wide[:, states.shape[1] + self._free[: v.shape[-1] - self.state_size]] = v[..., self.state_size :]
-        return wide
+    # --- the same with other parameters and sizes -----------------------------------------------------------------
 
-    def _scaled_states(self, x: Array) -> Array:
-        """Return the states divided by their sizes, a view of x, shape (K, n)."""
-        return x[: self.state_size].reshape(-1, self.scales.states.size)
+    #: Mesh and degree, of kinds that have them.
+    _grid: tuple[Any, ...] = ()
+
+    def _with(self, **changes: object) -> Self:
+        """Return the same with other free parameters, parameters or scales."""
+        given: dict[str, Any] = {"free": self.free, "parameters": self._values, "scales": self.scales, **changes}
+        return type(self)(self.problem, *self._grid, **given)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the same problem with other values of parameters that are not free."""
+        return self._with(parameters=self._values | dict(values))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
+        """Return the same problem with other free parameters (values from x), and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = self._with(free=free, parameters=values)
+        return other, other.pack(self.states(x), values)
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        rows = {name: np.ones(count) for name, count in self._rows}
+        scaled = self._with(scales=Scales(states, parameters, rows))
+        z = self.carrier(scaled)(x)
+        found = {name: usual(largest_entries(lambda at: scaled._row_sizes(at)[name], z)) for name in rows}  # noqa: B023
+        return self._with(scales=Scales(states, parameters, found)), z
+
+    def without_scales(self, x: Array) -> tuple[Self, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
 
     @abstractmethod
-    def refined(self) -> tuple[System, Carrier] | None:
-        """Return the same problem with every interval halved, and the carrier; None without a mesh."""
-
-    @abstractmethod
-    def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
-        """Return the same problem on a better mesh for x, and the carrier; None where there is no need."""
-
-    def on_switches(self, x: Array, closely: bool = False) -> tuple[System, Carrier] | None:
-        """Return the same problem on a mesh with the places of `switching` among its points; None where there is no need."""
-        return None
-
-    @abstractmethod
-    def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
+    def _row_sizes(self, x: Array) -> dict[str, Array]:
+        """Return the largest entries of F_x in the rows that have sizes of their own."""

@@ -19,7 +19,7 @@ from contin.core.differences import derivative, of_lines
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import Spectral, may_be_on_axis, off_axis
-from contin.core.system import Inputs, Scales, System, Term
+from contin.core.system import Composed, Inputs, Scales, System, Term
 from contin.core.trial import Event, Trial
 from contin.defining.critical import HopfCurve, other_pairs
 from contin.draws import ASIDE, generator, signs
@@ -164,7 +164,7 @@ def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPa
 HOMOCLINIC = "homoclinic"
 
 
-class Algebraic(Spectral, System):
+class Algebraic(Spectral, Composed):
     """An algebraic problem with chosen free parameters, as the continuation sees it.
 
     Unknowns ``x`` are the states, then the free parameters. The interface is that of
@@ -403,10 +403,9 @@ class Algebraic(Spectral, System):
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""
-        if self._residual.interpreted is None or not np.any(v):
-            return self._terms[0].bent(x, w, v)
-        # two Jacobians instead of one value for each entry
-        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / np.abs(v).max())[0]
+        if self._residual.interpreted is not None:
+            return System.bent(self, x, w, v)  # two Jacobians instead of one value for each entry
+        return self._terms[0].bent(x, w, v)
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
