@@ -42,6 +42,7 @@ from contin.defining.critical import HopfCurve
 from contin.draws import generator
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
+from contin.events.error import Solution
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import Coefficient, DenseForm, at_special_point
@@ -157,7 +158,7 @@ class Fields(Spectral, Collocation):
         """That of Hopf points."""
         return {HopfCurve.kind: HopfCurve}
 
-    def defining(self, point: Any, x: Array) -> tuple[HopfCurve, Array] | None:
+    def defining(self, point: Solution, x: Array) -> tuple[HopfCurve, Array] | None:
         """Return that of Hopf points."""
         frequency = frequency_of(point)
         if point.label != Label.HOPF or frequency is None:

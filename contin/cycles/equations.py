@@ -26,6 +26,7 @@ from contin.cycles.normal_forms import CycleForm
 from contin.draws import ASIDE
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.arc import Arc, SpecialPoint
+from contin.events.error import Solution
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.levels import APART, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import Blocks, Factors
@@ -76,7 +77,7 @@ class OfCycles(Discretization):
         """Those of period doublings and torus bifurcations."""
         return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
 
-    def defining(self: Any, point: Any, x: Array) -> tuple[Any, Array] | None:
+    def defining(self: Any, point: Solution, x: Array) -> tuple[Any, Array] | None:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
         if doubles(point):
             return DoublingCurve(self), x

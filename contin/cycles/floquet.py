@@ -29,6 +29,7 @@ from contin.cycles.ends import is_still
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.dips import AS_FAR, CIRCLE, LOOKS, MINUS_ONE, ONE, comes_near, separated
+from contin.events.error import Solution
 from contin.events.folds import on_finer_mesh
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import finding_of, frequency_of
@@ -201,7 +202,7 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
     return {"frequency": math.pi, "pairs": 1}
 
 
-def doubles(point: Any) -> bool:
+def doubles(point: Solution) -> bool:
     """Return whether `doubled` orbits leave a point: a period doubling, or a branch point at which a symmetry breaks."""
     return point.label == Label.PERIOD_DOUBLING or (point.label == Label.BRANCH_POINT and isinstance(point.details, dict))
 

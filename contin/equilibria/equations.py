@@ -26,6 +26,7 @@ from contin.draws import ASIDE, generator, signs
 from contin.equilibria.dependence import dependence
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
+from contin.events.error import Solution
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
@@ -526,7 +527,7 @@ class Algebraic(Spectral, Composed):
         """That of Hopf points."""
         return {HopfCurve.kind: HopfCurve}
 
-    def defining(self, point: Any, x: Array) -> tuple[HopfCurve, Array] | None:
+    def defining(self, point: Solution, x: Array) -> tuple[HopfCurve, Array] | None:
         """Return that of Hopf points."""
         if point.label != HopfCurve.kind:
             return None
