@@ -12,7 +12,7 @@ import typing
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ParamSpec, TypeGuard, TypeVar, cast
+from typing import Annotated, Any, NamedTuple, ParamSpec, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -193,6 +193,16 @@ def array(what: str, value: object, shape: tuple[int, ...]) -> Array:
 # --- the arguments of a public function ---------------------------------------------------------------------------------------
 
 
+class Within(NamedTuple):
+    """Bounds in an annotation, as ``Annotated[int, Within(1, 8)]``: as of `number` and, of an int, `whole`."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+
+Positive = Annotated[float, Within(0)]
+
+
 def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     """Return a public function that compares its arguments with its annotations before it runs.
 
@@ -233,7 +243,7 @@ def fields(record: object) -> None:
 def _annotations(annotated: object) -> tuple[dict[str, Any], Sequence[str]]:
     """Return the types of the arguments of a function, and the names of those given by place; of a class those of fields."""
     code = getattr(annotated, "__code__", None)
-    return typing.get_type_hints(annotated), code.co_varnames[: code.co_argcount] if code else ()
+    return typing.get_type_hints(annotated, include_extras=True), code.co_varnames[: code.co_argcount] if code else ()
 
 
 #: What a value of a plain type is called, and whether a value is one.
@@ -253,6 +263,9 @@ def _refusal(what: str, value: Any, kind: Any) -> str:
 
     In lists and mappings the first entry that is wrong is named.
     """
+    if hasattr(kind, "__metadata__"):
+        (number if kind.__origin__ is float else whole)(what, value, *kind.__metadata__[0])
+        return ""
     outer, inner = _parts(kind)
     fits = True
     inside: Iterator[str] = iter(())

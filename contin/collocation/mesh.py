@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
-from contin.errors import ProblemError
+from contin.errors import ProblemError, Within
 from contin.levels import CORRECTED
 from contin.text import shown
 
 DEGREES = range(2, 9)
+Degree = Annotated[int, Within(DEGREES[0], DEGREES[-1])]
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,7 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
 
 #: More intervals than any machine has room for: a bound for what users give.
 MOST_INTERVALS = 1_000_000
+Intervals = Annotated[int, Within(1, MOST_INTERVALS)]
 
 #: Error wanted between the mesh points where that at them is to be one, as a factor; below one for a margin. Ten times larger
 #: moves no special point of the test bank by more than 1e-9.
@@ -138,17 +140,15 @@ class MeshControl:
     """
 
     tolerance: float = 1e-12
-    min_intervals: int = 8
-    max_intervals: int = 2000
-    every: int = 3
+    min_intervals: Intervals = 8
+    max_intervals: Intervals = 2000
+    every: Annotated[int, Within(0, 1_000_000)] = 3
 
     def __post_init__(self) -> None:
         checks.number("mesh tolerance", self.tolerance, 0, 1)
-        checks.whole("min_intervals", self.min_intervals, 1, MOST_INTERVALS)
-        checks.whole("max_intervals", self.max_intervals, 1, MOST_INTERVALS)
+        checks.fields(self)
         if self.min_intervals > self.max_intervals:
             raise ProblemError(f"intervals: {self.min_intervals} to {self.max_intervals} must be in order")
-        checks.whole("every", self.every, 0, 1_000_000)
 
 
 #: No breaks.

@@ -10,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.collocation import newton as one_call
 from contin.core.protocol import Equations
-from contin.errors import ConvergenceError
+from contin.errors import ConvergenceError, Within
 from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 from contin.linalg.condensation import Factorization
@@ -48,11 +48,11 @@ class Newton:
     """
 
     tolerance: float = 1e-12
-    max_iterations: int = 10
+    max_iterations: Annotated[int, Within(1, 10_000)] = 10
 
     def __post_init__(self) -> None:
         checks.number("newton tolerance", self.tolerance, 0, 1)
-        checks.whole("max_iterations", self.max_iterations, 1, 10_000)
+        checks.fields(self)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypedDict
 
 from contin import errors as checks
 from contin import threads
@@ -13,8 +13,11 @@ from contin.collocation.mesh import MeshControl
 from contin.core.newton import Newton
 from contin.core.protocol import Discretization
 from contin.core.trial import Event
-from contin.errors import ProblemError, warn
+from contin.errors import Positive, ProblemError, Within, warn
 from contin.text import exact_text, meant
+
+Angle = Annotated[float, Within(0, 1.5)]
+Count = Annotated[int, Within(1, 10**9)]
 
 
 @dataclass(frozen=True)
@@ -73,11 +76,11 @@ class Settings:
     """
 
     primary: str | None = None
-    direction: int = 1
-    step: float = 0.05
-    min_step: float = 1e-6
+    direction: float = 1
+    step: Positive = 0.05
+    min_step: Positive = 1e-6
     max_step: float = 1e6
-    max_points: int = 2000
+    max_points: Count = 2000
     limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
     zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
     trivial: str | None = None
@@ -85,9 +88,9 @@ class Settings:
     folds: bool = True
     branch_points: bool = True
     errors: bool = True
-    angle: float | None = None
-    change: float = 0.4
-    accuracy: float | None = None
+    angle: Angle | None = None
+    change: Angle = 0.4
+    accuracy: Angle | None = None
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
     test_functions: Sequence[Event] = ()
@@ -99,34 +102,13 @@ class Settings:
         given = {name: getattr(self, name) for name in (*_FIRST_NAMES, "events")}
         for name, value in {**dict.fromkeys(_FIRST_NAMES, ()), **_by_new_name(given)}.items():
             object.__setattr__(self, name, value)
-        self._check_kinds()
-        self._check_numbers()
         self._check_columns()
-
-    def _check_kinds(self) -> None:
-        for name in ("primary", "trivial"):
-            if getattr(self, name) is not None:
-                checks.instance(name, getattr(self, name), str, "a name")
-        for name in ("folds", "branch_points", "errors"):
-            checks.truth(name, getattr(self, name))
-        checks.names("extrema", self.extrema)
-        for test in checks.sequence("events", self.events, "Event"):
-            checks.instance("events", test, Event, "an Event")
-        checks.instance("newton", self.newton, Newton, "a Newton")
-        checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
-
-    def _check_numbers(self) -> None:
+        checks.fields(self)
         if not checks.is_number(self.direction) or self.direction not in (1, -1):
             raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1")
-        for name in ("step", "min_step"):
-            checks.number(name, getattr(self, name), 0)
-        if not checks.is_number(self.max_step) or not self.min_step <= self.step <= self.max_step:
+        if not self.min_step <= self.step <= self.max_step:
             bounds = f"min_step = {exact_text(self.min_step)} and max_step = {checks.shown(self.max_step)}"
             raise ProblemError(f"step: {exact_text(self.step)} must lie between {bounds}")
-        checks.whole("max_points", self.max_points, 1, 10**9)
-        for name in ("angle", "accuracy", "change"):
-            if name == "change" or getattr(self, name) is not None:
-                checks.number(name, getattr(self, name), 0, 1.5)
 
     def _check_columns(self) -> None:
         for name, size in checks.mapping("scales", self.scales, "positive numbers").items():
@@ -167,11 +149,11 @@ class Options(TypedDict, total=False):
     """The fields of `Settings` by name, as `trace`, `curve` and `diagram` take them: a type checker knows what is misspelt."""
 
     primary: str | None
-    direction: int | Literal["both"]
-    step: float
-    min_step: float
+    direction: float | Literal["both"]
+    step: Positive
+    min_step: Positive
     max_step: float
-    max_points: int
+    max_points: Count
     limits: Mapping[str, Sequence[float]]
     zeros: Mapping[str, Sequence[float]]
     trivial: str | None
@@ -179,9 +161,9 @@ class Options(TypedDict, total=False):
     folds: bool
     branch_points: bool
     errors: bool
-    angle: float | None
-    change: float
-    accuracy: float | None
+    angle: Angle | None
+    change: Angle
+    accuracy: Angle | None
     newton: Newton
     mesh: MeshControl
     test_functions: Sequence[Event]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Iterator, Sequence
-from typing import Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.step import Reason, Stop
 from contin.cycles.statement import CycleProblem
-from contin.errors import ConvergenceError, ProblemError
+from contin.errors import ConvergenceError, Positive, ProblemError, Within
 from contin.events.labelled import finding_of
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.statement import PERIOD, ROUNDS, declared
@@ -254,9 +254,9 @@ class _Explorer:
 
 @checks.arguments
 def diagram(
-    start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, search: Search | None = None, progress: bool | None = None,
-    **options: Unpack[Options],
+    start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None,
+    depth: Annotated[int, Within(0, 1000)] = 2, symmetries: Sequence[Symmetry] = (), tolerance: Positive = 1e-5,
+    search: Search | None = None, progress: bool | None = None, **options: Unpack[Options],
 ) -> Diagram:  # fmt: skip
     """Follow every branch that can be reached from a solution, to a given depth.
 
@@ -296,8 +296,6 @@ def diagram(
     >>> [str(branch.stop) for branch in found.branches]
     ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
     """
-    checks.whole("depth", depth, 0, 1000)
-    checks.number("tolerance", tolerance, 0)
     check_maps("symmetries", symmetries)
     settings = settings_with(settings, options)
     symmetries = [*symmetries, *declared(system_of(start, "start").problem, "symmetries").values()]

@@ -19,7 +19,7 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from contin.core.newton import correct
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.system import System
-from contin.errors import ConvergenceError, ProblemError
+from contin.errors import ConvergenceError, Positive, ProblemError, Within
 from contin.functions.signature import argument_count
 from contin.levels import APART, LOCATED
 from contin.problems.statement import MOST_CONDITIONS, declared
@@ -144,22 +144,17 @@ class Search:
     ([0.5, 1.5], 'closed')
     """
 
-    values: Sequence[float] = ()
-    sizes: Sequence[float] = _SIZES
-    draws: int = _DRAWS
+    values: Sequence[Annotated[float, Within()]] = ()
+    sizes: Sequence[Positive] = _SIZES
+    draws: Annotated[int, Within(0, MOST_CONDITIONS)] = _DRAWS
     guesses: Sequence[Any] = ()
     maps: Sequence[Symmetry] = ()
-    most: int = 20
-    seed: int = 0
+    most: Annotated[int, Within(1, MOST_CONDITIONS)] = 20
+    seed: Annotated[int, Within(0, MOST_CONDITIONS)] = 0
 
     def __post_init__(self) -> None:
-        for name, low in (("values", -np.inf), ("sizes", 0.0)):
-            for each in checks.sequence(name, getattr(self, name), "numbers"):
-                checks.number(name, each, low)
-        checks.sequence("guesses", self.guesses, "guesses, as solve takes them")
+        checks.fields(self)
         check_maps("maps", self.maps)
-        for name, low in (("draws", 0), ("most", 1), ("seed", 0)):
-            checks.whole(name, getattr(self, name), low, MOST_CONDITIONS)
 
 
 @dataclass
@@ -359,7 +354,7 @@ class Site:
 @checks.arguments
 def further(
     known: Sequence[Point], name: str, search: Search | None = None, settings: Settings | None = None, *,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5,
+    symmetries: Sequence[Symmetry] = (), tolerance: Positive = 1e-5,
 ) -> Searched:  # fmt: skip
     """Search for further solutions at the parameters of known ones, without following any.
 
@@ -393,7 +388,6 @@ def further(
     problem = system_of(known[0], "known").problem
     checks.chosen("name", [name], tuple(problem.parameters))
     check_maps("symmetries", symmetries)
-    checks.number("tolerance", tolerance, 0)
     maps: list[Symmetry] = [lambda t, u: u, *symmetries, *declared(problem, "symmetries").values()]
     site = Site(name, known[0][name], settings or Settings(), maps, tolerance, search or Search())
     site.add_from(known)

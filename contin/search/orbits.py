@@ -31,7 +31,7 @@ from contin.cycles.ends import equilibrium_beside
 from contin.cycles.equations import CycleCollocation
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.equations import Algebraic
-from contin.errors import ConvergenceError, ProblemError
+from contin.errors import ConvergenceError, Positive, ProblemError
 from contin.functions.signature import named_values
 from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH
 from contin.linalg.orientation import first_least, oriented
@@ -419,7 +419,7 @@ def _saddle(system: CycleCollocation, x: Array) -> tuple[Array, int]:
 
 @checks.arguments
 def cycle(
-    problem: CycleProblem, start: Sequence[float], parameters: Mapping[str, float] | None = None, *, settle: float = 100.0,
+    problem: CycleProblem, start: Sequence[float], parameters: Mapping[str, float] | None = None, *, settle: Positive = 100.0,
     intervals: int = 40, degree: int | None = None,
 ) -> Point:  # fmt: skip
     """Return the stable cycle that a time integration from ``start`` settles on.
@@ -452,7 +452,6 @@ def cycle(
     >>> round(cycle(problem, [1.0, 0.0])["period"], 6)
     6.663287
     """
-    checks.number("settle", settle, 0)
     found = restated(problem, _numbers(start, len(problem.state_names)), dict(parameters or {}))
     problem, first, values = found[0], found[1].at(found[1].places)[0], found[2]
     values = {**problem.parameters, **values}

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
-from contin.collocation.mesh import DEGREES, MOST_INTERVALS, MeshControl
+from contin.collocation.mesh import Degree, Intervals, MeshControl
 from contin.continuation.first import ROUNDS_OF_MESHES
 from contin.core.newton import Corrected, Newton, correct
 from contin.core.protocol import Discretization, inner
@@ -87,7 +88,7 @@ def deflated(system: Discretization, x: Array, known: list[Array], longest: floa
 @checks.arguments
 def solve(
     problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess = None, parameters: Mapping[str, float] | None = None, *,
-    free: Sequence[str] = (), intervals: int = 20, degree: int | None = None, mesh: MeshControl | None = None,
+    free: Sequence[str] = (), intervals: Intervals = 20, degree: Degree | None = None, mesh: MeshControl | None = None,
     newton: Newton = Newton(), others: Sequence[Point] = (),
 ) -> Point:  # fmt: skip
     """Return one solution near a guess, on a mesh adapted to it.
@@ -131,7 +132,6 @@ def solve(
     (2.0, -2.0)
     """
     control = MeshControl() if mesh is None else mesh
-    checks.whole("intervals", intervals, 1, MOST_INTERVALS)
     forget_changed(problem)
     problem, start, parameters = restated(problem, guess, _checked(parameters))
     if any(system_of(other, "others").problem.states != problem.states for other in others):
@@ -142,12 +142,9 @@ def solve(
         known = {name: value for name, value in start.point.parameters.items() if name not in read}
         parameters = {**known, **parameters}
     held = _check_count(problem, free)
-    if degree is not None:
-        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
-    elif start.point is not None and start.point.system.is_function_of_t:
-        degree = start.point.system.degree
-    else:
-        degree = problem.usual_degree(control.tolerance)
+    if degree is None:
+        given: Any = start.point and start.point.system
+        degree = given.degree if given and given.is_function_of_t else problem.usual_degree(control.tolerance)
     system, x = first_guess(problem, start, parameters, free, intervals, degree)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ParamSpec, Unpack
+from typing import Annotated, Any, ParamSpec, Unpack
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from contin.cycles.floquet import doubles
 from contin.cycles.map_equations import MapSystem
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.equations import Algebraic, CriticalPair, critical_pair
-from contin.errors import ConvergenceError, ProblemError, warn
+from contin.errors import ConvergenceError, ProblemError, Within, warn
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import finding_of, frequency_of
 from contin.levels import APART, BESIDE
@@ -334,7 +334,8 @@ def _backwards(point: Point) -> Point:
 
 @either_way
 @checks.arguments
-def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
+def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None,
+          branch: Annotated[int, Within(0, 10)] | None = None,
           tangent: Array | None = None, progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
@@ -397,8 +398,6 @@ def _first(
         if branch is not None or free is not None:
             raise ProblemError("tangent: must be left out where branch or free is given")
         return system, x, way * checks.array("tangent", tangent, (system.size,)), True
-    if branch is not None:
-        checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
         cycles, x, along = switched(start, settings.mesh.min_intervals, free)
         return cycles, x, way * along, True

@@ -33,7 +33,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 
@@ -55,7 +55,7 @@ from contin.defining.critical import HopfCurve
 from contin.defining.special_points import BranchPointCurve, EventCurve, ExtremumCurve, FoldCurve
 from contin.defining.system import Defining
 from contin.equilibria.equations import HOMOCLINIC, Algebraic, critical_pair
-from contin.errors import ConvergenceError, ProblemError
+from contin.errors import ConvergenceError, ProblemError, Within
 from contin.levels import APART, ROUGH
 from contin.problems.statement import TIME
 from contin.results.branch import Branch
@@ -306,8 +306,8 @@ def _homoclinic(base: Algebraic, x: Array) -> First:
 @either_way
 @checks.arguments
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: Event | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
-          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
+          event: Event | None = None, hold: str | None = None, kind: str | None = None, progress: bool | None = None,
+          branch: Annotated[int, Within(0, 1)] = 0, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
@@ -359,7 +359,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     """
     shown, new = Progress(progress), any(each is not None for each in (second, free, event, hold))
     goes_on = start.system.on_curve and not new
-    _check(event, hold, kind, branch, goes_on)
+    _check(event, hold, kind, goes_on)
     names = start.system.free if goes_on else _free_parameters(start, second, free)
     settings = settings_with(settings, {"branch_points": False, "primary": names[-1], **options})
     if goes_on:
@@ -367,8 +367,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     return follow_until_interrupted(Continuation(*_first_of_curve(start, names, event, hold), settings), shown)
 
 
-def _check(event: Event | None, hold: str | None, kind: str | None, branch: int, goes_on: bool) -> None:
-    checks.whole("branch", branch, 0, 1)
+def _check(event: Event | None, hold: str | None, kind: str | None, goes_on: bool) -> None:
     if kind is not None and not goes_on:
         raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
     if hold is not None and event is not None:
