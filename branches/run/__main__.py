@@ -33,22 +33,15 @@ def parser():
         "--workers", type=int, metavar="N", help="number of processes for a scene of many branches (default: number of cores)"
     )
     parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=3600.0,
-        metavar="S",
+        "--time-limit", type=float, default=3600.0, metavar="S",
         help="largest time in seconds for each branch of a scene of many branches",
-    )
+    )  # fmt: skip
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
     parser.add_argument(
-        "--search",
-        type=int,
-        nargs="?",
-        const=8,
-        metavar="N",
+        "--search", type=int, nargs="?", const=8, metavar="N",
         help="look for further states at labelled values, and where stages of an open strip end, from N random guesses beside "
         "each known state (default: 8)",
-    )
+    )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
     existing.add_argument("--resume", action="store_true", help="continue an unfinished result file; start if there is none")

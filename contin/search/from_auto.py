@@ -133,7 +133,8 @@ class _Block:
         values = np.array([_numbers(row[_HEAD:]) for row in self.rows])
         width = (len(self.rows[0].rstrip("\n")) - _HEAD) // values.shape[1]
         names = [self.headings[_HEAD + k * width : _HEAD + (k + 1) * width].strip() for k in range(values.shape[1])]
-        names = [_renamed(name, self.names) for name in names]
+        auto = [re.fullmatch(r"PAR\((\d+)\)", name.replace("PERIOD", _PERIOD)) for name in names]
+        names = [self.names.get(int(found[1]), name) if found else name for name, found in zip(names, auto)]
         return AutoBranch(dict(zip(names, values.T)), [_label(head[2]) if head[3] else "" for head in self.heads])
 
 
@@ -200,12 +201,6 @@ def _label(code: int) -> str:
 
 def _numbers(text: str) -> list[float]:
     return [float(f"{digits}e{exponent or 0}") for digits, exponent in _NUMBER.findall(text)]
-
-
-def _renamed(heading: str, names: Mapping[int, str]) -> str:
-    """Return the name of a parameter for AUTO's heading ``PAR(1)``, others as they are; the period is PAR(11)."""
-    number = 11 if heading == "PERIOD" else int(found[1]) if (found := re.fullmatch(r"PAR\((\d+)\)", heading)) else 0
-    return names.get(number, heading)
 
 
 def _blocks(text: str, given: Mapping[int, str]) -> Iterator[_Block]:
@@ -314,9 +309,8 @@ def from_auto(
     ('LP', True)
     """
     if solution.states.shape[1] != len(problem.state_names):
-        raise ProblemError(
-            f"solution: {solution.states.shape[1]} states must be {len(problem.state_names)}, as the problem has"
-        )
+        count = len(problem.state_names)
+        raise ProblemError(f"solution: {solution.states.shape[1]} states must be {count}, as the problem has")
     values = _values(problem, solution, parameters or {})
     system, x = _system(problem, solution, with_multipliers(problem, checks.names("free", free)), values)
     if solution.label not in _LOCATED:
@@ -373,31 +367,24 @@ def _at_nodes(solution: AutoSolution) -> Array:
 
 
 def _located(system: System, x: Array, solution: AutoSolution) -> Point:
-    """Return the special point near x: the run goes some steps back, then forth across it.
+    """Return the special point near x: the run goes some steps back, then forth across it, or the other way.
 
     Raises
     ------
     ConvergenceError
         There is none of this label.
     """
+    primary = system.free[0]
+    wanted = float(x[system.parameter_index(primary)])
     sizes = dict.fromkeys((*system.problem.states, *system.free), 1.0)  # at a special point, those of x may not be typical
     for scales in (sizes, {}):
-        for point in _looked_for(system, x, scales):
-            if point.label == solution.label:
-                return point
+        *_, back = Continuation(system, x, Settings(direction=-1, step=_STEP, max_points=2, errors=False, scales=scales))
+        way = 1 if wanted >= back[primary] else -1
+        for direction in (way, -way):
+            settings = Settings(direction=direction, step=_STEP, max_points=_LOOKS, scales=scales)
+            for point in Continuation(back.system, back.x, settings):
+                if point.label == solution.label and abs(point[primary] - wanted) <= _CLOSE * (1 + abs(wanted)):
+                    return point
     raise ConvergenceError(
         f"solution: no {solution.label} of the problem is near AUTO's label {solution.number}; compare the equations"
     )
-
-
-def _looked_for(system: System, x: Array, scales: Mapping[str, float]) -> Iterator[Point]:
-    """Yield the labelled points near x, from some steps back on, both ways."""
-    primary = system.free[0]
-    wanted = float(x[system.parameter_index(primary)])
-    *_, back = Continuation(system, x, Settings(direction=-1, step=_STEP, max_points=2, errors=False, scales=scales))
-    way = 1 if wanted >= back[primary] else -1
-    for direction in (way, -way):
-        settings = Settings(direction=direction, step=_STEP, max_points=_LOOKS, scales=scales)
-        yield from (
-            p for p in Continuation(back.system, back.x, settings) if abs(p[primary] - wanted) <= _CLOSE * (1 + abs(wanted))
-        )

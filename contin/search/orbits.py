@@ -452,7 +452,8 @@ def cycle(
     >>> round(cycle(problem, [1.0, 0.0])["period"], 6)
     6.663287
     """
-    found = restated(problem, _numbers(start, len(problem.state_names)), dict(parameters or {}))
+    first = checks.array("start", start, (len(problem.state_names),))
+    found = restated(problem, first, dict(parameters or {}))
     problem, first, values = found[0], found[1].at(found[1].places)[0], found[2]
     values = {**problem.parameters, **values}
     field = _vector_field(problem, values)
@@ -465,13 +466,6 @@ def cycle(
     states = states - whole_rounds(states[0], periods_of(problem))  # begins in the first round
     given = {name: value for name, value in values.items() if name not in winding_names(problem.angles)}  # as the motion has
     return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
-
-
-def _numbers(start: Sequence[float], count: int) -> Array:
-    array = np.asarray(start, dtype=float).ravel()
-    if array.size != count or not np.isfinite(array).all():
-        raise ProblemError(f"start: {checks.shown(start)} must be {count} finite numbers, the states")
-    return array
 
 
 #: The field as an integrator calls it, f(t, u).
