@@ -83,13 +83,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
 
 
 def _primaries(result: Path) -> dict[str, StoredBranch]:
-    """Return the primary branches of a result that have an index, by file name.
-
-    Raises
-    ------
-    StoreError
-        There is none.
-    """
+    """Return the primary branches of a result that have an index, by file name; raise StoreError where there is none."""
     if result.is_dir():
         names = sorted({data["file"] for _, _, data in read(result).edges(data=True) if "origin" not in data})
         found = {name: read_branch(result / name) for name in names}

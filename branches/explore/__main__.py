@@ -57,13 +57,7 @@ def main(argv=None) -> int:
 
 
 def _page_path(out: str):
-    """Where the page goes.
-
-    Raises
-    ------
-    StoreError
-        No page can be written there.
-    """
+    """Return where the page goes; raise StoreError where none can be written."""
     from pathlib import Path
 
     from branches.store.files import StoreError, prepare

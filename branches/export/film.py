@@ -152,13 +152,7 @@ def _mp4(frames: Iterable[np.ndarray]) -> bytes:
 
 
 def _ffmpeg() -> str:
-    """The program that writes MP4.
-
-    Raises
-    ------
-    StoreError
-        There is none; the sentence says what to install.
-    """
+    """Return the program that writes MP4; raise StoreError, which says what to install, where there is none."""
     program = shutil.which("ffmpeg")
     if program is None:
         try:

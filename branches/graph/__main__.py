@@ -117,13 +117,7 @@ def _states(graph, options) -> Iterable[str]:
 
 
 def _of_open_strips(graph, options) -> Iterable[str]:
-    """Yield the labelled points of a diagram of open strips, stage by stage.
-
-    Raises
-    ------
-    StoreError
-        A question that is for closed strips.
-    """
+    """Yield the labelled points of open strips, stage by stage; raise StoreError on a question for closed strips."""
     from branches.graph.open_strips import listed
 
     if options.where or options.at is not None or options.folds:

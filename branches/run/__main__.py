@@ -118,12 +118,7 @@ def _tell_barriers(path, display, quiet: bool) -> None:
 
 
 def _check_search(scene) -> None:
-    """Refuse a search that is not made.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Raise ConfigError on a search that is not made."""
     from branches.scene.fields import ConfigError
 
     first = next(iter(scene.scenes.values()))

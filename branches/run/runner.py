@@ -121,12 +121,7 @@ class _Begun:
 
 
 def _begun(scene: Scene, path: Path | None) -> _Begun:
-    """Return the run of a scene from its first point, or the one that goes on with the unfinished file at ``path``.
-
-    Raises
-    ------
-    ConfigError, StoreError
-    """
+    """Return the run of a scene from its first point, or the one that goes on with the unfinished file at ``path``."""
     stages = stages_of(scene)
     rows, kept = (np.empty(0), {}) if path is None else read_kept(path)
     if path is None or not len(rows):  # it was interrupted before its first step

@@ -144,13 +144,7 @@ def _said(statement: dict[str, Any]) -> str:
 
 
 def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
-    """Return what is stored of a discretized problem.
-
-    Raises
-    ------
-    ProblemError
-        It is of a kind that is not stored.
-    """
+    """Return what is stored of a discretized problem; raise ProblemError if it is of a kind that is not stored."""
     base = system.solution
     if system.on_curve and getattr(system, "kind", "") not in _curves(base):
         raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")

@@ -313,13 +313,7 @@ def diagram(
 
 
 def _with_values(settings: Settings, system: Discretization, search: Search) -> Settings:
-    """Return settings that label the values of a search on all branches.
-
-    Raises
-    ------
-    ProblemError
-        A value outside the limits; cycles.
-    """
+    """Return settings that label the values of a search; raise ProblemError on one outside the limits, and on cycles."""
     primary = settings.primary or system.free[0]
     low, high = settings.limits.get(primary, (-np.inf, np.inf))
     if system.is_cycle:

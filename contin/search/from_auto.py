@@ -204,13 +204,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _blocks(text: str, given: Mapping[int, str]) -> Iterator[_Block]:
-    """Yield the branches of a file: each begins with lines of branch 0, the last of which holds the headings.
-
-    Raises
-    ------
-    ValueError
-        There are none.
-    """
+    """Yield the branches of a file, which begin with lines of branch 0, the last with headings; raise ValueError without any."""
     block: _Block | None = None
     names: dict[int, str] = {}
     for line in text.splitlines():
@@ -321,13 +315,7 @@ def from_auto(
 def _values(
     problem: BoundaryValueProblem | AlgebraicProblem, solution: AutoSolution, given: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values of all parameters of a problem.
-
-    Raises
-    ------
-    ProblemError
-        One is missing.
-    """
+    """Return the values of all parameters of a problem; raise ProblemError where one is missing."""
     own = {}
     if isinstance(problem, CycleProblem):
         own = {ROUNDS: 1.0} if problem.period is not None else {PERIOD: solution.parameters.get(_PERIOD, 0.0)}
@@ -367,12 +355,9 @@ def _at_nodes(solution: AutoSolution) -> Array:
 
 
 def _located(system: System, x: Array, solution: AutoSolution) -> Point:
-    """Return the special point near x: the run goes some steps back, then forth across it, or the other way.
+    """Return the special point near x; raise ConvergenceError where there is none of this label.
 
-    Raises
-    ------
-    ConvergenceError
-        There is none of this label.
+    The run goes some steps back, then forth across it, or the other way.
     """
     primary = system.free[0]
     wanted = float(x[system.parameter_index(primary)])

@@ -218,13 +218,7 @@ def _bisected(saddle: _Saddle, first: GrownOrbit, second: GrownOrbit, direction:
 
 
 def _followed(saddle: _Saddle, value: float, guess: Array, direction: int) -> GrownOrbit | None:
-    """Return the orbit at a value of the parameter up to its return; None where it does not come back.
-
-    Raises
-    ------
-    ConvergenceError
-        The saddle is not found.
-    """
+    """Return the orbit at a value of the parameter up to its return; None where it does not come back."""
     rest, right, left, rate = saddle.at(value, guess)
     start = rest + direction * DOUBLED * (1 + np.abs(rest).max()) * right / np.abs(right).max()
     found = _until_return(saddle, value, rest, start, _LONGEST / rate)
@@ -399,13 +393,7 @@ def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, N
 
 
 def _saddle(system: CycleCollocation, x: Array) -> tuple[Array, int]:
-    """Return the equilibrium beside a cycle, shape (n,), and the number of its unstable eigenvalues.
-
-    Raises
-    ------
-    ProblemError
-        None is found from where the motion is slowest, or it is no saddle.
-    """
+    """Return the equilibrium beside a cycle, shape (n,), and the number of its unstable eigenvalues."""
     found = equilibrium_beside(system, x)
     if found is None:
         raise ProblemError("start: no equilibrium is found from where it is slowest; take a cycle of longer period")
@@ -490,12 +478,7 @@ class _Motion(NamedTuple):
 
 
 def _integrated(field: Field, start: Array, time: float, tolerance: float, dense: bool = False) -> _Motion:
-    """Return the motion from a start. SciPy's own loop around its integrator takes longer than the steps.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the motion from a start. SciPy's own loop around its integrator takes longer than the steps."""
     from scipy.integrate import LSODA, OdeSolution  # .3 s; only this needs it
 
     far, steps = _FAR * (1 + np.abs(start).max(initial=0.0)), LSODA(field, 0.0, start, time, rtol=tolerance, atol=tolerance)

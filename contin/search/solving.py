@@ -262,13 +262,7 @@ def _advice(system: System) -> str:
 
 
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
-    """Return the free parameter that is held because another one is found in its place, if there is one.
-
-    Raises
-    ------
-    ProblemError
-        Too many or too few parameters are free.
-    """
+    """Return the free parameter that is held because another one is found in its place; raise ProblemError on their number."""
     needed = problem.free_size - 1
     if needed < 0:
         there = len(problem.state_names) + needed

@@ -483,13 +483,7 @@ def _own_tangent(start: Point, system: Discretization, settings: Settings) -> Ar
 
 
 def _tangent(start: Point, system: Discretization, branch: int) -> Array:
-    """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order.
-
-    Raises
-    ------
-    ProblemError
-        The start is no branch point, or one in other parameters, or has fewer branches.
-    """
+    """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order."""
     known = finding_of(start.details)
     if not known.is_branch_point:
         first = "0 or 1" if switches(start) else "0"

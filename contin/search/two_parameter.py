@@ -264,13 +264,7 @@ def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float |
 
 
 def _angle(exponents: ComplexArray, expected: float) -> float:
-    """Return the angle of the complex pair of multipliers that is nearest to an expected one on the unit circle.
-
-    Raises
-    ------
-    ProblemError
-        There is none: two real multipliers have the product one.
-    """
+    """Return the angle of the complex pair of multipliers that is nearest to an expected one on the unit circle."""
     pairs = exponents[(exponents.imag > 0) & (exponents.imag < math.pi)]
     if not pairs.size:
         raise ProblemError("kind: no torus bifurcations leave from this point: the multipliers of the cycles there are real")
@@ -415,13 +409,7 @@ _First = tuple[Defining, Array]
 
 
 def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hold: str | None) -> _First:
-    """Return the defining system of the kind of a point.
-
-    Raises
-    ------
-    ProblemError
-        It is of no kind that can be followed.
-    """
+    """Return the defining system of the kind of a point; raise ProblemError if none can be followed."""
     base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
     if event is not None:
         return _event(start, base, x, event)
@@ -466,13 +454,7 @@ def _is_at_a_value(start: Point) -> bool:
 
 
 def _holding(start: Point, column: str) -> Point:
-    """Return the point as one where a column has a given value, the one that it has.
-
-    Raises
-    ------
-    ProblemError
-        There is no such column.
-    """
+    """Return the point as one where a column has the value that it has; raise ProblemError if there is no such column."""
     known = (*start.parameters, *start.functionals, *start.system.named_states)
     if column not in known:
         raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
@@ -500,13 +482,7 @@ def _slope(column: str, system: System, x: Array) -> Array:
 
 
 def _event(start: Point, base: System, x: Array, event: Event) -> _First:
-    """A zero of a user's test function.
-
-    Raises
-    ------
-    ProblemError
-        It is no zero of that.
-    """
+    """Return a zero of a user's test function; raise ProblemError where it is none."""
     found = EventCurve(base, event)
     here, slope = found.value(x), found.own_gradients(x)[0]
     if not abs(here) <= APART * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
