@@ -204,7 +204,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _blocks(text: str, given: Mapping[int, str]) -> Iterator[_Block]:
-    """Yield the branches of a file, which begin with lines of branch 0, the last with headings; raise ValueError without any."""
+    """Yield the branches of a file, which begin with lines of branch 0, the last with headings; raise ValueError if none."""
     block: _Block | None = None
     names: dict[int, str] = {}
     for line in text.splitlines():
