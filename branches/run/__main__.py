@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
@@ -82,6 +83,7 @@ def _run(options) -> int:
         if scene.many:
             return _run_many(scene, options)
         path = output_path(options)
+        scene = _with_stability(scene, path)
     except (ConfigError, StoreError) as error:
         return _refuse(error)
     from branches.run.display import StartingDisplay
@@ -102,6 +104,21 @@ def _run(options) -> int:
     if outcome == "complete" and options.search is not None:
         _tell_further(scene, path, display, options)
     return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+
+
+def _with_stability(scene, path):
+    """Return the scene of one branch with stability, unless it says otherwise or the file that is there has none."""
+    from branches.store.files import StoreError
+    from branches.store.layout import CLOSED
+
+    if scene.KIND != CLOSED or "stability" in scene.model_fields_set:
+        return scene
+    if path.exists():
+        from branches.store.read import read_branch
+
+        with contextlib.suppress(StoreError):  # the run says what is wrong with it
+            return scene.model_copy(update={"stability": read_branch(path).scene.stability})
+    return scene.model_copy(update={"stability": True})
 
 
 def _tell_barriers(path, display, quiet: bool) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from branches.read import read_branch
 from branches.run.__main__ import main
 from branches.run.display import Display
 from branches.run.runner import Interruption, run_scene
@@ -407,6 +408,16 @@ def test_resuming_without_a_file_starts_and_says_so(tmp_path, silent):
     assert run_scene(scene_of(), path, display, resume=True) == "complete"
     assert display.notes == [f"--resume: there is no file {str(path)!r}; the run starts from the beginning"]
     assert path.exists()
+
+
+def test_one_branch_has_its_stability(tmp_path, monkeypatch, capsys):
+    """Unless the scene says otherwise, or a file that is there has none; a second run is that of the same scene."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one.yaml").write_text("{m: 1, n: 2, steps: {max_points: 8}}")
+    first, plain = ["one.yaml", "--quiet"], ["one.yaml", "--quiet", "--out", "plain.h5", "--set", "stability=false"]
+    assert [main(arguments) for arguments in (first, first, plain, plain[:4])] == [0] * 4
+    assert read_branch("one.h5").points["index"].tolist()[1:] == [0] * (len(rows("one.h5")) - 1)
+    assert "index" not in read_branch("plain.h5").points.dtype.names
 
 
 def test_a_run_that_is_lost(scene, capsys, monkeypatch):
