@@ -151,7 +151,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
         fill = "white" if piece.stable is False else branch.colour(piece.stage)
         places = across[piece.rows], up[piece.rows]
         if dots:
-            style = {"facecolors": fill, "edgecolors": branch.colour(piece.stage), "lw": points(0.8), "zorder": 1.5}
+            style = {"facecolors": fill, "edgecolors": branch.colour(piece.stage), "lw": points(0.8), "zorder": 0.9}
             axes.scatter(*places, s=area(_DOT), **style)
         index = branch.index_on(piece.rows)
         if index > 0:

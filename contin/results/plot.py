@@ -178,6 +178,12 @@ def plot(
         named |= _draw(points, (x, column_name), pieces, named, (axes, color))
         if errors:
             _bars(points, (x, column_name), axes)
+    across, up = axes.dataLim.intervalx, axes.dataLim.intervaly
+    for shown, (low, high), limit in (([x], across, axes.set_xlim), (columns, up, axes.set_ylim)):
+        size, error = max(abs(low), abs(high)), np.nanmax([0.0, *(error_bar(point, one) for point in points for one in shown)])
+        if high - low <= 10 * error:  # what differs by its error only is a straight line
+            half = size / 2 if size > 10 * error else 0.5
+            limit((low + high) / 2 - half, (low + high) / 2 + half, auto=True)
     axes.set(xlabel=_WORDS.get(x, x), ylabel=_WORDS.get(name, name))
     if any(point.label for point in points) or named - {None}:
         axes.legend(frameon=False)
@@ -205,7 +211,7 @@ def _draw(
         dashes, word = _LINES[stable] if len(pieces) > 1 or stable is not None else ("-", "")
         fine = slice(piece.start * PARTS, (piece.stop - 1) * PARTS + 1)
         axes.plot(x[fine], y[fine], lw=1.5, color=color, ls=dashes, label=once(word and word + kind), zorder=1)
-    style: dict[str, Any] = {"s": _DOT, "edgecolors": color, "linewidths": 0.8, "zorder": 1.5}
+    style: dict[str, Any] = {"s": _DOT, "edgecolors": color, "linewidths": 0.8, "zorder": 0.9}
     fill = [color if full else "white" for full in filled]
     _tell(axes, axes.scatter(across, up, c=fill, picker=True, pickradius=_NEAR, **style), points)
     labels = [point.label for point in points]

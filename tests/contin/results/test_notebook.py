@@ -184,6 +184,18 @@ def test_a_problem_without_functionals_is_drawn_by_its_first_state_or_its_norm()
     assert axes.get_ylabel() == "norm (root mean square over t)"
 
 
+def test_what_differs_by_its_error_only_is_a_straight_line():
+    """x = 1 for every b, and y = b / 10, in one picture after the other."""
+    from matplotlib.figure import Figure
+
+    flat = contin.AlgebraicProblem(lambda u, p: ((u.x - 1) * (3 + math.sin(7 * p.b)), u.y - p.b / 10), ["x", "y"], {"b": 1.0})
+    branch = contin.trace(contin.solve(flat, [1.1, 0.0]), free=["b"], limits={"b": (1, 3)})
+    axes = branch.plot("b", "x", axes=Figure().subplots())
+    assert axes.get_ylim() == pytest.approx((0.5, 1.5), abs=1e-9)
+    low, high = branch.plot("b", "y", axes=axes).get_ylim()
+    assert low < 0.1 and 1 < high < 1.2
+
+
 def test_contin_alone_imports_neither_library():
     code = "import sys, contin; print([name for name in ('matplotlib', 'pandas') if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
