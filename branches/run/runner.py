@@ -288,7 +288,7 @@ class Interruption:
     """
 
     #: Seconds. A point of a large network takes longer; the last checkpoint has the points up to half a second before.
-    GRACE = 0.7
+    GRACE = 0.5
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
     def __init__(self, signals=_SIGNALS):
