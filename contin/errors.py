@@ -275,7 +275,8 @@ def _refusal(what: str, value: Any, kind: Any) -> str:
         others = [each for each in inner if each is not types.NoneType]
         if value is not None and len(others) == 1:
             return _refusal(what, value, others[0])
-        fits = any(value is None if each is types.NoneType else not _refusal(what, value, each) for each in inner)
+        none = value is None and len(others) < len(inner)
+        fits = none or any(not _refusal(what, value, each) for each in others)
     elif outer is collections.abc.Callable:
         fits = callable(value)
     elif outer is collections.abc.Mapping:

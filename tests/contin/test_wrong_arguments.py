@@ -144,3 +144,9 @@ def test_the_sentence_names_the_argument(call, sentence):
     with pytest.raises(contin.ProblemError) as told:
         call()
     assert sentence in str(told.value)
+
+
+def test_none_is_taken_where_it_is_the_default():
+    """Also where the annotation has bounds."""
+    assert contin.solve(PARABOLA, [1.0], degree=None, mesh=None)["x"] == pytest.approx(1.0)
+    assert contin.Settings(angle=None, accuracy=None) == contin.Settings()
