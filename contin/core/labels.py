@@ -6,7 +6,7 @@ import enum
 
 
 class Label(enum.StrEnum):
-    """Labels that contin itself compares; each is a string, too. Events of users may have others."""
+    """Labels that contin itself gives; each is a string, too. Events of users may have others."""
 
     REGULAR = ""
     END = "EP"
@@ -37,6 +37,12 @@ class Label(enum.StrEnum):
     NEUTRAL_BIFOCUS = "NFF"
     NON_CENTRAL = "NCH"
     SHILNIKOV_HOPF = "SH"
+    DOUBLE_REAL_STABLE = "DRS"
+    DOUBLE_REAL_UNSTABLE = "DRU"
+    DIVERGENT_STABLE = "NDS"
+    DIVERGENT_UNSTABLE = "NDU"
+    ORBIT_FLIP_STABLE = "OFS"
+    ORBIT_FLIP_UNSTABLE = "OFU"
     INCLINATION_FLIP_STABLE = "IFS"
     INCLINATION_FLIP_UNSTABLE = "IFU"
 
