@@ -88,11 +88,14 @@ class Place:
         Columns of quaternion, centreline, and their multipliers; by default those of a strip alone.
     names : mapping of str to str
         Names of the section's numbers in the problem, where they are others.
+    part : callable
+        The part of the strip at a part of the problem's domain.
     """
 
     strains: Strains
     states: Sequence[int] | None = None
     names: Mapping[str, str] = field(default_factory=dict)
+    part: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def numbers(self, trial: Trial) -> SimpleNamespace:
         """Return the numbers of the section."""
@@ -149,7 +152,9 @@ def _least_margin(section: Section, place: Place, trial: Trial) -> float:
 
     def margins(times: np.ndarray) -> np.ndarray:
         states = system.evaluate(x, times).T
-        return section.margin(times, moment_on_directors(states[frame], states[moment]).T, np.empty((len(times), 0)), p)
+        return section.margin(
+            place.part(times), moment_on_directors(states[frame], states[moment]).T, np.empty((len(times), 0)), p
+        )
 
     times = system.nodes
     values = margins(times)
@@ -165,4 +170,4 @@ def _least_margin(section: Section, place: Place, trial: Trial) -> float:
 def _convexity(section: Section, place: Place, trial: Trial) -> float:
     """Return the least `Section.margin` at the strains of the nodes and on lines between these."""
     p, omega = place.numbers(trial), place.strains(trial.system, trial.x)
-    return _least_on_lines(lambda t, w: section.margin(t, w, w, p), trial.system.nodes, omega)
+    return _least_on_lines(lambda t, w: section.margin(place.part(t), w, w, p), trial.system.nodes, omega)

@@ -38,6 +38,8 @@ class Member:
         The quaternion of its frame there.
     strains : tuple of float
         Curvature about the width, about the normal, and twist of the drawing; the state begins so.
+    span : tuple of float
+        The parts of a strip at which it begins and ends, for data along the strip: a member may be a piece of one (`cut`).
 
     Examples
     --------
@@ -53,6 +55,11 @@ class Member:
     place: Vector = (0.0, 0.0, 0.0)
     frame: Quaternion = (1.0, 0.0, 0.0, 0.0)
     strains: Vector = (0.0, 0.0, 0.0)
+    span: tuple[float, float] = (0.0, 1.0)
+
+    def part(self, t):
+        """Return the part of the strip at a part t of the member."""
+        return self.span[0] + (self.span[1] - self.span[0]) * t
 
     def drawn(self, s: float | np.ndarray) -> np.ndarray:
         """Return quaternion and place (K, 7) of the drawing at distances s (K,) from its beginning."""
@@ -72,9 +79,12 @@ class Member:
             raise ValueError(f"cut: {list(fractions)} must increase between 0 and 1")
         begins = self.drawn([part * self.length for part in places[:-1]])
         return [
-            Member(self.section, (end - begin) * self.length, numbers_of(state[4:]), numbers_of(state[:4]), self.strains)
+            Member(
+                self.section, (end - begin) * self.length, numbers_of(state[4:]), numbers_of(state[:4]), self.strains,
+                (self.part(begin), self.part(end)),
+            )
             for begin, end, state in zip(places, places[1:], begins)
-        ]
+        ]  # fmt: skip
 
 
 def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member:

@@ -196,7 +196,7 @@ class NetworkChain:
         found = []
         for member, piece in zip(self.network.members.values(), self.pieces):
             section = self.network.sections[member.section]
-            t = (np.arange(len(piece.strains)) + 0.5) / len(piece.strains)
+            t = member.part((np.arange(len(piece.strains)) + 0.5) / len(piece.strains))
             found.append(
                 section.strain_energy(
                     t, piece.strains, SimpleNamespace(**self.network.numbers_of(member.section, self.numbers))

@@ -44,7 +44,7 @@ class States(Statement):
         for (name, member), places in zip(self.members.items(), self.places):
             section = self.sections[member.section]
             names = {number: self.full_name(member.section, number) for number in section.parameters}
-            place = law_end.Place(functools.partial(self._strains_of, name), tuple(places), names)
+            place = law_end.Place(functools.partial(self._strains_of, name), tuple(places), names, member.part)
             found.append((section, law_end.tests(section, place)))
         return found
 

@@ -255,7 +255,8 @@ class Statement:
         for place, (name, member) in enumerate(self.members.items()):
             homogeneous = self.sections[member.section].homogeneous
             differs = place if self.phases else None
-            key = member.section, member.strains, None if homogeneous else member.length, differs, self._outline[0].get(name)
+            inside = None if homogeneous else (member.length, member.span)
+            key = member.section, member.strains, inside, differs, self._outline[0].get(name)
             if key not in densities:
                 densities[key] = self._hamiltonian(member, place)
             segments.append(
@@ -309,7 +310,7 @@ class Statement:
             part = part_of(p)
             for number, strain in drawn.items():
                 values[number] = part * values[number] + (1 - part) * strain
-            value = complementary(0.0 if homogeneous else s / length, M1, M2, M3, numbers(*values))
+            value = complementary(0.0 if homogeneous else member.part(s / length), M1, M2, M3, numbers(*values))
             value = value + n1 * d[6] + n2 * d[7] + n3 * d[8] - part * potential(x, d, p)
             for integral, multiplier in zip(integrals, lam[7:]):
                 value = value + multiplier * integral.density(place, s / length, x, p, count) / length

@@ -20,6 +20,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from branches.scene.columns import OWN
 from branches.scene.fields import ConfigError, StepConfig, Strict
 from branches.scene.open_strip import (
+    Along,
     Axis,
     EndWords,
     FollowConfig,
@@ -163,6 +164,9 @@ class NetworkScene(StagedScene):
     title: str = ""
     material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
     sections: dict[str, dict[str, float | int | str]] = Field(default_factory=dict, description="several of these, by name")
+    along: Along = Field(
+        default_factory=dict, description="data along strips, with s from 0 to 1: expressions, or tables of [s, value]"
+    )
     strips: dict[str, StripConfig] = Field(min_length=1, max_length=200)
     joints: dict[str, Annotated[JointConfig, _short("strips")]] = Field(default_factory=dict)
     held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints; nothing: the network floats")
@@ -317,14 +321,19 @@ class NetworkScene(StagedScene):
 
     def _sections(self) -> dict[str, Section]:
         given = self.sections if self.material is None else {"strip": self.material}
-        found = {}
+        found, names = {}, {name: "" if len(given) == 1 else f"_{name}" for name in given}
+        for name in self.along:
+            if not name.endswith(tuple(names.values())):
+                raise ValueError(f"along: {name!r} must end in the name of a section, as in {name}{[*names.values()][0]}")
         for name, values in given.items():
             where = "material" if self.material is not None else f"sections: {name}"
             if "law" not in values:
                 raise ValueError(f"{where}: the field 'law' is missing")
             law, numbers = str(values["law"]), {number: value for number, value in values.items() if number != "law"}
             try:
-                found[name] = section_of(law, numbers_of(where, numbers))
+                behind = names[name]
+                own = {each.removesuffix(behind): text for each, text in self.along.items() if each.endswith(behind)}
+                found[name] = section_of(law, numbers_of(where, numbers), own)
             except ValueError as error:
                 raise ValueError(str(error) if str(error).startswith(where) else f"{where}: {error}") from error
         return found

@@ -228,6 +228,9 @@ def _expression(value: object) -> Any:
     return text
 
 
+Along = dict[str, Annotated[str, BeforeValidator(_expression)]]
+
+
 class OpenMesh(MeshConfig):
     """Fields of the mesh."""
 
@@ -360,9 +363,7 @@ class OpenScene(StagedScene):
     title: str = ""
     material: dict[str, float | int | str] = Field(description="law, and its numbers")
     dimensions: DimensionsConfig | None = None
-    along: dict[str, Annotated[str, BeforeValidator(_expression)]] = Field(
-        default_factory=dict, description="data along the strip: expressions in s, or tables of [s, value]"
-    )
+    along: Along = Field(default_factory=dict, description="data along the strip: expressions in s, or tables of [s, value]")
     start: EndWords = EndConfig()
     finish: EndWords = EndConfig()
     closed: ClosedConfig | None = None

@@ -69,7 +69,7 @@ class OpenBranch(StoredBranch):
             section = network.sections[member.section]
             numbers = SimpleNamespace(**network.numbers_of(member.section, dict(zip(network.problem.parameters, values))))
             along = {
-                field: np.array([float(section.datum(name)(s, numbers)) for s in t])
+                field: np.array([float(section.datum(name)(s, numbers)) for s in member.part(t)])
                 for field, name in (("breadth", "width"), ("depth", "thickness")) if name in section.along
             }  # fmt: skip
             shapes.append(replace(flat_across(shape, section.form), **along))

@@ -420,6 +420,31 @@ _CHANGES = [  # of an open strip: what is followed, to which value, what is held
 ]  # fmt: skip
 
 
+TAPERED = """
+material: {law: flat rod, nu: 0.3}
+along: {kappa_n: 1 + s**2, thickness: 1 - 0.3*s, width: [[0, 1], [1, 0.5]]}
+"""
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("joints", ["", ", M: [a at 0.3]"])
+def test_data_along_a_strip_are_those_of_the_open_strip_also_where_it_is_cut(joints):
+    drawn = "strips: {a: {begin: [1, 2, 3], along: z, normal: y, length: 1.0, bend: 1.3}}\nheld: {A: clamped}\n"
+    drawn += f"joints: {{A: [a start], B: [a finish]{joints}}}\nloads: {{P: {{B: [0, 1, 0]}}}}\nnumbers: {{P: 2.0}}\n"
+    network = parse(f"{TAPERED}{drawn}stages: [{{follow: P, to: 3.0}}]", "scene.yaml").strip()
+    strip = parse(
+        f"{TAPERED}finish: free\nnumbers: {{force_normal: 2.0}}\nstages: [{{follow: force_normal, to: 3.0}}]", "s"
+    ).strip()
+    assert network.first_point()[0]["energy"] == pytest.approx(strip.first_point()["energy"], rel=1e-9)
+
+
+def test_data_along_no_section_are_refused():
+    text = "sections: {a: {law: rod, B1: 1, B2: 1, C: 1}, b: {law: rod, B1: 1, B2: 1, C: 1}}\nalong: {kappa_n: s}\n"
+    text += "strips: {a: {section: a, begin: [0, 0, 0], end: [0, 0, 1], normal: y}}\nstages: [{follow: C_a, to: 2}]"
+    with pytest.raises(ConfigError, match="along: 'kappa_n' must end in the name of a section, as in kappa_n_a"):
+        parse(text, "scene.yaml")
+
+
 @pytest.mark.full
 def test_supports_that_change_are_those_of_open_strips(run):
     """A strip that is pushed, clamped, compressed, and let go twice: the network of one strip is the open strip."""
