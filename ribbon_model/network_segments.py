@@ -178,7 +178,20 @@ class NetworkChain:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self._starts[-1]
+        return len(self._kept)
+
+    @cached_property
+    def _fixed(self) -> dict[str, int]:
+        """Joints at which a member begins that nothing moves there, and its number."""
+        held = self.network.held
+        begins = self.network.begins.items()
+        return {name: one for name, one in begins if held[name].rotation == CLAMPED and len(held[name].held) == 3}
+
+    @cached_property
+    def _kept(self) -> np.ndarray:
+        """Places of the unknowns among those of all members, without rigid motions of members whose beginning is fixed."""
+        fixed = [np.arange(6) + self._starts[number] for number in self._fixed.values()]
+        return np.delete(np.arange(self._starts[-1]), np.array(fixed, dtype=int).ravel())
 
     @cached_property
     def _starts(self) -> list[int]:
@@ -278,8 +291,8 @@ class NetworkChain:
     def _joint_frame(self, each: JointEnd) -> np.ndarray:
         """Return the rotation (3, 3) of an end from the drawing, before which it is turned by its angle."""
         angle = self.numbers[each.angle] if isinstance(each.angle, str) else each.angle
-        back = Rotation.from_rotvec(-angle * np.array(each.axis)).as_matrix()
-        return self._frame_of_end(self._end(each)) @ self.network.drawn_axes(each) @ back
+        frame = self._frame_of_end(self._end(each)) @ self.network.drawn_axes(each)
+        return frame @ Rotation.from_rotvec(-angle * np.array(each.axis)).as_matrix() if angle else frame
 
     def _hinge(self, name: str) -> tuple[np.ndarray, float, np.ndarray]:
         """Return the frame of a support, turned with its hinge, that angle, and the axis of the hinge."""
@@ -318,6 +331,8 @@ class NetworkChain:
 
     def _of_supports(self) -> Iterator[_Condition]:
         for name, end in self.network.held.items():
+            if name in self._fixed:
+                continue
             each = self.network.joints[name].members[0]
             here, to = self._end(each), self.network.prescriptions[name][1](self._values)
             if end.held:
@@ -335,11 +350,11 @@ class NetworkChain:
 
     @property
     def _missed(self) -> np.ndarray:
-        return np.concatenate([one.missed for one in self._conditions])
+        return np.concatenate([np.zeros(0), *(one.missed for one in self._conditions)])
 
     def _by_end(self, end: _End, turns: bool) -> np.ndarray:
         """Return the derivative (3, n) of the rotation vector, or of the place at the arm, of an end."""
-        piece, found = self.pieces[end.piece], np.zeros((3, self.size))
+        piece, found = self.pieces[end.piece], np.zeros((3, self._starts[-1]))
         own = piece.turns[end.last] if turns else piece.moves[end.last] - cross_matrix(end.arm) @ piece.turns[end.last]
         found[:, self._own(end.piece)] = own
         return found
@@ -347,11 +362,11 @@ class NetworkChain:
     @property
     def _slopes(self) -> np.ndarray:
         """Derivatives (c, n) of the conditions, where they are met."""
-        found = []
+        found = [np.zeros((0, self._starts[-1]))]
         for one in self._conditions:
             change = self._by_end(one.end, one.turns)
             found.append(one.rows @ (change if one.other is None else change - self._by_end(one.other, one.turns)))
-        return np.concatenate(found)
+        return np.concatenate(found)[:, self._kept]
 
     # --- derivatives ------------------------------------------------------------------------------------------------------
 
@@ -361,7 +376,7 @@ class NetworkChain:
         All but the slopes are times the number of segments; the multipliers minimize the gradient.
         """
         count, slopes = sum(len(piece.strains) for piece in self.pieces), self._slopes
-        gradient = np.zeros(self.size)
+        gradient = np.zeros(self._starts[-1])
         for number, (piece, (_, moment, _), pulls) in enumerate(zip(self.pieces, self._densities, self._pulls)):
             own = piece.of_strains(piece.segment * moment) - piece.work(pulls[1:])
             own[3:6] -= pulls[0]
@@ -374,7 +389,8 @@ class NetworkChain:
             couple = size * self._hinge(name)[2]
             acting.turn(end, -couple)
             gradient -= couple @ self._by_end(end, True)
-        multipliers = -np.linalg.lstsq(slopes.T, gradient, rcond=None)[0]
+        gradient = gradient[self._kept]
+        multipliers = -np.linalg.lstsq(slopes.T, gradient, rcond=None)[0] if len(slopes) else np.zeros(0)
         first = 0
         for one in self._conditions:
             push = multipliers[first : first + len(one.rows)] @ one.rows
@@ -388,7 +404,7 @@ class NetworkChain:
 
     def _hessian(self, acting: _Acting) -> np.ndarray:
         """Return the second derivatives (n, n) of the energy and of the conditions times their multipliers."""
-        found = np.zeros((self.size, self.size))
+        found = np.zeros((self._starts[-1], self._starts[-1]))
         _, springs, _, across = self._distributed
         for number, (piece, (_, _, stiffness), pulls) in enumerate(zip(self.pieces, self._densities, self._pulls)):
             forces = -pulls[1:]
@@ -406,7 +422,7 @@ class NetworkChain:
         for first, other, push in acting.pairs:
             cross = self._by_end(other, True).T @ cross_matrix(push) @ self._by_end(first, True) / 2
             found -= cross + cross.T
-        return found
+        return found[np.ix_(self._kept, self._kept)]
 
     # --- other states -----------------------------------------------------------------------------------------------------
 
@@ -422,11 +438,12 @@ class NetworkChain:
         return moved(self, change, lambda chain: chain._missed, lambda chain: chain._slopes, failed)
 
     def _changed(self, change) -> NetworkChain:
-        pieces = []
+        pieces, whole = [], np.zeros(self._starts[-1])
+        whole[self._kept] = change
         for number, piece in enumerate(self.pieces):
-            own, strains = change[self._own(number)], piece.strains.copy()
+            own, strains = whole[self._own(number)], piece.strains.copy()
             strains[:, list(piece.free)] += own[6:].reshape(len(strains), -1)
-            first = Rotation.from_rotvec(own[:3]).as_matrix() @ piece.first
+            first = Rotation.from_rotvec(own[:3]).as_matrix() @ piece.first if own[:3].any() else piece.first
             pieces.append(replace(piece, strains=strains, first=first, place=piece.place + own[3:6]))
         return replace(self, pieces=tuple(pieces))
 

@@ -348,7 +348,7 @@ class Statement:
         joints = list(self.joints.items())
         held = [(name, *self._prescribing(name, end)) for name, end in self.held.items()]
         floating = self._floating() if self.floats else None
-        holding, begins = [each.holds for each in self.integrals.values()], self._begins
+        holding, begins = [each.holds for each in self.integrals.values()], self.begins
         gaps, readers = self._gaps, {name: self._reader(joint) for name, joint in self.joints.items()}
 
         def conditions(a, b, p):
@@ -378,7 +378,7 @@ class Statement:
         return conditions
 
     @property
-    def _begins(self) -> dict[str, int]:
+    def begins(self) -> dict[str, int]:
         """Supports without numbers at the beginning of a member that is drawn on the axes, and the number of that member."""
         order, found = list(self.members), {}
         for name, end in self.held.items():
