@@ -32,7 +32,7 @@ def link(path: Path) -> None:
     """Make the machine code of all kernels of contin, and link it to a shared library."""
     for module in pkgutil.walk_packages(contin.__path__, "contin."):
         importlib.import_module(module.name)
-    kernels = [each for each in dict.fromkeys(kernel.KERNELS.values()) if each.name.startswith("contin.")]
+    kernels = [each for each in kernel.KERNELS if each.name.startswith("contin.")]
     objects = [path.with_name(f"{each.entry}.o") for each in kernels]
     for each, file in zip(kernels, objects):
         file.write_bytes(each.code.object)

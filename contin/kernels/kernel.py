@@ -7,8 +7,9 @@ A kernel is a Python function whose annotations are its signature:
         for i in range(x.size):
             x[i] *= factor
 
-Its machine code is read from the cache where it is defined. Otherwise `contin.kernels.compiler` makes it when the kernel is
-called for the first time, and keeps it. `contin.kernels.kernel_parts` has the types of arguments, and what kernels call.
+Its machine code is read from the cache when the kernel is called for the first time. Where it is not there,
+`contin.kernels.compiler` makes it, and it is kept. `contin.kernels.kernel_parts` has the types of arguments, and what
+kernels call.
 """
 
 from __future__ import annotations
@@ -30,15 +31,15 @@ import numpy as np
 
 from contin import threads
 from contin.errors import ContinError
-from contin.kernels import machine_code
-from contin.kernels.kernel_parts import KERNELS, length, parts
+from contin.functions import machine_code
+from contin.kernels.kernel_parts import length, parts
 from contin.kernels.machine_code import cache_directory
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class Kernel:
-    """A kernel whose machine code was not in the cache when it was defined.
+    """A kernel, and its machine code when that is needed.
 
     Parameters
     ----------
@@ -55,18 +56,15 @@ class Kernel:
 
     @functools.cached_property
     def parts(self) -> list[Any]:
-        """What it is made of, as far as that is defined where it stands."""
+        """What it is made of."""
         return parts(self.function)
 
     @functools.cached_property
     def files(self) -> frozenset[Path]:
         """Files that its machine code is made of: those in which it, its helpers and the kernels that it calls stand."""
-        return self._files(self.parts)
-
-    def _files(self, used: list[Any]) -> frozenset[Path]:
-        modules = {self.function.__module__, *(part.__module__ for part in used if not isinstance(part, int | float))}
+        modules = {self.function.__module__, *(part.__module__ for part in self.parts if not isinstance(part, int | float))}
         files = {Path(str(sys.modules[module].__file__)) for module in modules}
-        return frozenset(files.union(*(part.files for part in used if isinstance(part, Kernel))))
+        return frozenset(files.union(*(part.files for part in self.parts if isinstance(part, Kernel))))
 
     @functools.cached_property
     def entry(self) -> str:
@@ -88,15 +86,6 @@ class Kernel:
         """The function that runs the machine code that came with the package; None where there is none."""
         return machine_code.shipped(self.entry, self.name, self.function.__doc__)
 
-    def stored(self) -> Callable[..., Any] | None:
-        """Return the function that runs the machine code that came with the package or is in the cache; None without any."""
-        if self.shipped is not None or not _has_compiler():
-            return self.shipped
-        code = machine_code.stored(self.key)
-        with contextlib.suppress(ContinError):  # a kernel that it calls may not be in the cache
-            return machine_code.loaded(code, self.name, self.function.__doc__) if code else None
-        return None
-
     @functools.cached_property
     def compiled(self) -> Callable[..., Any]:
         """The function that runs the machine code; that of the kernels that it calls is loaded before."""
@@ -105,8 +94,8 @@ class Kernel:
         if not _has_compiler():
             raise ContinError(_NO_COMPILER)
         code = self.code
-        for part in parts(self.function):
-            if isinstance(part, Kernel) and part is not self:
+        for part in self.parts:
+            if isinstance(part, Kernel):
                 _ = part.compiled
         return machine_code.loaded(code, self.name, self.function.__doc__)
 
@@ -117,7 +106,7 @@ class Kernel:
         if found is not None:
             return found
         _share_work()
-        others = _by_length(other for other in _shared() if other is not self and "code" not in vars(other))
+        others = _by_length(other for other in _shared() if other is not self)
         while True:
             found = self._made()
             if found is not None:
@@ -140,18 +129,11 @@ class Kernel:
                 return None
             found = machine_code.stored(self.key)
             if found is None:
-                late = self._files(parts(self.function)) - self.files
-                if late:  # the key would not change with them
-                    raise TypeError(f"{self.name}: what it uses of {sorted(late)[0]} must be imported above it")
-                from contin.kernels import compiler  # numba takes .3 s, and is needed the first time only
+                from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
 
                 found = compiler.machine_code(self.function, self.reorder, self.entry)
                 machine_code.keep(self.key, found)
             return found
-
-    def __call__(self, *arguments: object) -> Any:
-        """Run the machine code."""
-        return self.compiled(*arguments)
 
 
 @overload
@@ -173,16 +155,12 @@ def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) ->
     """
     if function is None:
         return functools.partial(kernel, reorder=reorder, last=last)
-    made = Kernel(function, reorder, last)
-    found = made.stored()
-    if found is None:
-        _PENDING.append(made)
-    KERNELS[found or made] = made
-    return found or made
+    KERNELS.append(Kernel(function, reorder, last))
+    return machine_code.late(KERNELS[-1], KERNELS[-1].name, function.__doc__)
 
 
-#: Kernels whose machine code was not in the cache when they were defined.
-_PENDING: list[Kernel] = []
+#: All kernels that are defined.
+KERNELS: list[Kernel] = []
 #: Seconds between two looks whether another process has made what this one waits for.
 _WAIT = 0.05
 #: Kernels of these modules are made by two processes.
@@ -191,7 +169,8 @@ _PACKAGE = __name__.partition(".")[0] + "."
 
 def _shared() -> list[Kernel]:
     """Return the engine's kernels that are not made yet; others may be wrong, and are made where they are called."""
-    return [each for each in _PENDING if each.name.startswith(_PACKAGE)]
+    own = [each for each in KERNELS if each.name.startswith(_PACKAGE) and "code" not in vars(each)]
+    return [each for each in own if machine_code.stored(each.key) is None]
 
 
 @functools.cache
@@ -228,7 +207,7 @@ def prepare(modules: Sequence[str]) -> None:
     """Make the machine code of the kernels that modules define."""
     for module in modules:
         importlib.import_module(module)
-    for each in _by_length(_PENDING):
+    for each in _by_length(KERNELS):
         each.prepare()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from types import CodeType, ModuleType
+from types import BuiltinFunctionType, CodeType, ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Concatenate, NamedTuple, ParamSpec, TypeAlias, TypeVar, overload
 
 from contin.arrays import Array, Indices
@@ -59,7 +59,7 @@ def names_in(code: CodeType) -> frozenset[str]:
 
 
 def parts(function: Callable[..., Any]) -> list[Any]:
-    """Return what a kernel is made of besides its own code, as far as it is defined now.
+    """Return what a kernel is made of besides its own code.
 
     These are helpers, instructions, named tuples, enumerations and numbers, and those that they use; and kernels, without what
     they use.
@@ -69,7 +69,7 @@ def parts(function: Callable[..., Any]) -> list[Any]:
     def add(scope: Mapping[str, Any], names: Iterable[str]) -> None:
         for name in sorted(scope.keys() & set(names)):
             value = scope[name]
-            if (id(scope), name) in found or value is function:
+            if (id(scope), name) in found:
                 continue
             if isinstance(value, ModuleType):
                 found[id(scope), name] = None
@@ -82,7 +82,7 @@ def parts(function: Callable[..., Any]) -> list[Any]:
             elif isinstance(value, type) and (hasattr(value, "_fields") or hasattr(value, "__members__")):
                 found[id(scope), name] = value
                 add(vars(sys.modules[value.__module__]), _hints(value))
-            elif kernel_of(value) is not None:
+            elif getattr(kernel_of(value), "function", function) is not function:
                 found[id(scope), name] = kernel_of(value)
 
     add(function.__globals__, _names(function))
@@ -105,13 +105,9 @@ def length(function: Callable[..., Any]) -> int:
     return sum(len(each.__code__.co_code) for each in (function, *(helper.function for helper in helpers)))
 
 
-#: Kernels by what stands under their names: themselves, or functions that run their machine code.
-KERNELS: dict[Any, Any] = {}
-
-
 def kernel_of(value: Any) -> Any:
     """Return the `contin.kernels.kernel.Kernel` that a global value stands for; None where it is none."""
-    return KERNELS.get(value) if callable(value) and value.__hash__ else None
+    return getattr(value.__self__, "kernel", None) if isinstance(value, BuiltinFunctionType) else None
 
 
 class Instruction:

@@ -19,6 +19,7 @@ import os
 import platform
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -68,8 +69,10 @@ def _temporary_directory() -> Path:
 ENTRY = "contin_"
 #: Behind the name of that function, the name of the one that other kernels call.
 INNER = "_inner"
-#: Python calls it with an array of arguments (METH_FASTCALL).
-_CALLED_WITH_ARRAY = 0x0080
+#: Python calls it with an array of arguments and names, which are not read (METH_FASTCALL, METH_KEYWORDS).
+_CALLED_WITH_ARRAY = 0x0080 | 0x0002
+#: The function of Python that has the same arguments: it calls the first one.
+_CALL = ctypes.cast(ctypes.pythonapi.PyObject_Vectorcall, ctypes.c_void_p).value
 
 
 class Code(NamedTuple):
@@ -220,6 +223,8 @@ class _Method(ctypes.Structure):
     _fields_ = [("name", ctypes.c_char_p), ("function", ctypes.c_void_p), ("flags", ctypes.c_int), ("doc", ctypes.c_char_p)]
 
 
+#: Machine code is loaded by one thread at a time.
+_LOADING = threading.RLock()
 #: What functions point to, as long as the process lives.
 _KEPT: list[_Method] = []
 
@@ -242,14 +247,38 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
     return _called(engine.get_function_address(code.entry), name, doc)
 
 
-def _called(address: int | None, name: str, doc: str | None) -> Callable[..., Any]:
-    """Return the function at an address as a Python function."""
+def _called(address: int | None, name: str, doc: str | None, call: Callable[..., Any] | None = None) -> Callable[..., Any]:
+    """Return the function at an address as a Python function; without one, ``call`` is called the first time and names it."""
     module, _, own = name.rpartition(".")
-    method = _Method(own.encode(), address, _CALLED_WITH_ARRAY, (doc or "").encode())
+    method = _Method(own.encode(), address or _CALL, _CALLED_WITH_ARRAY, (doc or "").encode())
     _KEPT.append(method)
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype, make.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    return make(ctypes.addressof(method), (np.ndarray, None, TypeError), module)
+    ctypes.pythonapi.PyCFunction_GetFunction.restype = ctypes.c_void_p
+    return make(ctypes.addressof(method), _Self((np.ndarray, None, TypeError, call, method)), module)
+
+
+class _Self(tuple[Any, ...]):
+    """What a function of machine code is called with; it stands for the function until its machine code is there."""
+
+    __slots__ = ()
+
+    def __call__(self, *arguments: object) -> Any:
+        """Run the machine code, and let the function be it from now on."""
+        with _LOADING:
+            found = self.kernel.compiled
+        self[4].function = ctypes.pythonapi.PyCFunction_GetFunction(ctypes.py_object(found))
+        return found(*arguments)
+
+    @property
+    def kernel(self) -> Any:
+        """The `contin.functions.kernel.Kernel`."""
+        return self[3]
+
+
+def late(kernel: Any, name: str, doc: str | None) -> Callable[..., Any]:
+    """Return the function that runs ``kernel.compiled``, which is asked for when it is called for the first time."""
+    return _called(None, name, doc, kernel)
 
 
 @functools.cache

@@ -40,6 +40,12 @@ def kernel(tmp_path, monkeypatch):
     return lambda: Kernel(_twice, reorder=True)
 
 
+def stored(kernel):
+    """The function of the machine code that the cache has; None without any."""
+    code = machine_code.stored(kernel.key)
+    return code and machine_code.loaded(code, kernel.name, kernel.function.__doc__)
+
+
 def _file(folder: Path) -> Path:
     (path,) = folder.glob("k*.bin")
     return path
@@ -49,9 +55,9 @@ X = np.array([3.0])
 
 
 def test_machine_code_is_kept(kernel, tmp_path):
-    assert kernel().stored() is None
-    assert kernel()(X, 2) == 12.0
-    found = kernel().stored()
+    assert stored(kernel()) is None
+    assert kernel().compiled(X, 2) == 12.0
+    found = stored(kernel())
     assert found(X, 2) == 12.0
     assert found.__name__ == "_twice" and found.__doc__ == "Double the sum." and found.__module__ == __name__
 
@@ -59,41 +65,41 @@ def test_machine_code_is_kept(kernel, tmp_path):
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("length", [0, 1, 20, 300, -1])
 def test_files_cut_anywhere_are_replaced(kernel, tmp_path, length):
-    kernel()(X, 2)
+    kernel().compiled(X, 2)
     path = _file(tmp_path)
     whole = path.read_bytes()
     os.truncate(path, length % len(whole))
-    assert kernel().stored() is None
-    assert kernel()(X, 2) == 12.0
-    assert kernel().stored()(X, 2) == 12.0
+    assert stored(kernel()) is None
+    assert kernel().compiled(X, 2) == 12.0
+    assert stored(kernel())(X, 2) == 12.0
 
 
 def test_a_changed_byte_is_noticed(kernel, tmp_path):
-    kernel()(X, 2)
+    kernel().compiled(X, 2)
     path = _file(tmp_path)
     data = bytearray(path.read_bytes())
     for place in (0, 40, len(data) // 2, len(data) - 1):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
-        assert kernel().stored() is None
+        assert stored(kernel()) is None
 
 
 def test_code_of_another_key_under_the_same_name_is_not_taken(kernel, tmp_path):
-    kernel()(X, 2)
+    kernel().compiled(X, 2)
     other = Kernel(_twice, reorder=False)
     _file(tmp_path).rename(tmp_path / f"k{other.key}.bin")
-    assert other.stored() is None
-    assert other(X, 2) == 12.0
+    assert stored(other) is None
+    assert other.compiled(X, 2) == 12.0
 
 
 @pytest.mark.full
 def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
-    kernel()(X, 2)
+    kernel().compiled(X, 2)
     key, path = kernel().key, cache.cache_directory() / f"k{kernel().key}.bin"
     made = path.read_bytes()
     path.unlink()
     with ThreadPoolExecutor() as executor:
         with machine_code.claim(key) as mine:
-            waiting = executor.submit(kernel(), X, 2)
+            waiting = executor.submit(lambda: kernel().compiled(X, 2))
             time.sleep(0.3)
             assert mine and not waiting.done()
             path.write_bytes(made)
@@ -113,12 +119,12 @@ def test_the_second_process_makes_kernels_of_modules(tmp_path, monkeypatch):
 
 
 def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
-    kernel()(X, 2)
+    kernel().compiled(X, 2)
     key = kernel().key
     path = cache.cache_directory() / f"k{key}.bin"
     head, code = machine_code._unpacked(path.read_bytes())
     machine_code.keep(key, machine_code.Code(head["entry"], ("no_such_function",), code))
-    assert kernel().stored() is None
+    assert stored(kernel()) is None
 
 
 def _flat(x: Matrix) -> float:
@@ -128,7 +134,7 @@ def _flat(x: Matrix) -> float:
 def test_code_that_only_a_process_with_numba_can_run_is_refused():
     """It would be made again in every process."""
     with pytest.raises(TypeError, match="calls numba_attempt_nocopy_reshape, which is there only where numba is loaded"):
-        Kernel(_flat, reorder=True)(np.eye(2))
+        Kernel(_flat, reorder=True).compiled(np.eye(2))
 
 
 def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
@@ -180,19 +186,19 @@ def library(kernel, tmp_path, monkeypatch):
 
 def test_machine_code_that_comes_with_the_package_needs_no_compiler(library, kernel, tmp_path, monkeypatch):
     monkeypatch.setattr(kernels, "_has_compiler", lambda: False)
-    found = kernel().stored()
-    assert found(X, 2) == kernel()(X, 2) == 12.0
+    found = kernel().compiled
+    assert found(X, 2) == kernel().compiled(X, 2) == 12.0
     assert found.__name__ == "_twice" and found.__doc__ == "Double the sum."
     assert not list(tmp_path.glob("k*.bin"))
 
 
 def test_code_of_another_source_is_not_taken_from_the_package(library, monkeypatch):
     other = Kernel(_twice, reorder=False)
-    assert other.stored() is None
-    assert other(X, 2) == 12.0
+    assert other.shipped is None
+    assert other.compiled(X, 2) == 12.0
     monkeypatch.setattr(kernels, "_has_compiler", lambda: False)
     with pytest.raises(ContinError, match="numba, which makes it, is not installed: pip install numba"):
-        Kernel(_flat, reorder=True)(np.eye(2))
+        Kernel(_flat, reorder=True).compiled(np.eye(2))
 
 
 @pytest.mark.sample(3)
@@ -205,15 +211,15 @@ def test_code_of_another_source_is_not_taken_from_the_package(library, monkeypat
 )  # fmt: skip
 def test_arguments_of_other_types_are_refused(kernel, arguments):
     with pytest.raises((TypeError, OverflowError)):
-        kernel()(*arguments)
-    assert kernel()(X, np.int64(2)) == 12.0
+        kernel().compiled(*arguments)
+    assert kernel().compiled(X, np.int64(2)) == 12.0
 
 
 def test_arrays_that_cannot_be_written_are_refused_where_they_might_be(kernel):
     fixed = X.copy()
     fixed.flags.writeable = False
     with pytest.raises(TypeError):
-        kernel()(fixed, 2)
+        kernel().compiled(fixed, 2)
 
 
 def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
@@ -222,7 +228,7 @@ def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
 
     monkeypatch.setattr(machine_code, "write_whole", full)
     machine_code._warn_not_kept.cache_clear()
-    assert kernel()(X, 2) == 12.0
+    assert kernel().compiled(X, 2) == 12.0
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "No space left on device" in said and "CONTIN_CACHE_DIR" in said
 
@@ -329,7 +335,7 @@ def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, c
     for name, value in {"HOME": "/proc/none", "XDG_CACHE_HOME": "", "CONTIN_CACHE_DIR": ""}.items():
         monkeypatch.setenv(name, value)
     folder = cache.cache_directory()
-    assert folder.parent == tmp_path and Kernel(_twice, reorder=True)(X, 2) == 12.0 and _file(folder).exists()
+    assert folder.parent == tmp_path and Kernel(_twice, reorder=True).compiled(X, 2) == 12.0 and _file(folder).exists()
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "set CONTIN_CACHE_DIR to keep it" in said
     monkeypatch.setattr(tempfile, "tempdir", "/proc/none")
