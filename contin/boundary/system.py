@@ -579,7 +579,8 @@ class Collocation(Composed):
     def breaks(self) -> Array:
         """Places where the equations have jumps or corners in t, whatever the states are: points of a good mesh."""
         given = self.problem.domain, self.parameters, self._free
-        return np.unique(np.concatenate([breaks_of(self.problem.batch(name), *given) for name in self._of_the_mesh]))
+        found = np.concatenate([breaks_of(self.problem.batch(name), *given) for name in self._of_the_mesh])
+        return np.unique(found) if found.size else found  # the first call loads numpy.ma
 
     @functools.cached_property
     def _selections(self) -> list[tuple[str, Selections]]:
