@@ -10,8 +10,8 @@ that are zero, or nothing but errors, follow from the exact Taylor expansion of 
 3. The eigenvector v of mu leads to the branch that leaves there. The amplitude at which a nonlinear term along v is as large as
    the linear one is the size of the states that take part in v.
 
-Where the branch is flat in p, as at the top of a circle, its bend alone bounds the size of p: a term of higher order that is as
-large as a state whose small value is more than nothing, since F_x would be singular not much further than that away.
+Where the branch is flat in p, as at the top of a circle, its bend bounds the size of p: a term of higher order that is as large
+as the value of a state.
 
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
@@ -37,7 +37,6 @@ from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.folds import on_finer_mesh
 from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
-from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
 #: Iterations of the power method, and largest Krylov space that parts close eigenvalues. Sizes are powers of two: the distance
@@ -175,9 +174,8 @@ class _FirstPoint:
         terms = [self.system.largest(term) for term in self._terms()]
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
-        small = (known > 0) & (known < USUAL[0]) & ~at
-        bends = np.where(at | (small & ~(known > DOUBLED * self._alone(small))), 0.0, known)
-        reach = min(_held(reach, terms[0], np.where(at, 0.0, known)), _bent(terms, bends))
+        others = np.where(at, 0.0, known)
+        reach = min(_held(reach, terms[0], others), _bent(terms, others))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
@@ -257,15 +255,6 @@ class _FirstPoint:
             if not np.any(part & left):
                 return
             left = left & ~part
-
-    def _alone(self, which: Pattern) -> Array:
-        """Return how far states can change by themselves before F_x is singular; infinity where that never happens."""
-        found = np.full(which.size, np.inf)
-        for number in np.flatnonzero(which) if np.count_nonzero(which) <= MANY else ():
-            alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
-            mode = self._nearest(alone, np.ones_like(which))
-            found[number] = np.inf if mode is None else mode.distance
-        return found
 
     def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
         """Return the nearest singular point in a direction and the null vector there, of some states; None where there is none.
