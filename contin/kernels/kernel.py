@@ -31,7 +31,7 @@ import numpy as np
 
 from contin import threads
 from contin.errors import ContinError
-from contin.functions import machine_code
+from contin.kernels import machine_code
 from contin.kernels.kernel_parts import length, parts
 from contin.kernels.machine_code import cache_directory
 
@@ -50,8 +50,7 @@ class Kernel:
     """
 
     def __init__(self, function: Callable[..., Any], reorder: bool, last: bool = False) -> None:
-        functools.update_wrapper(self, function)
-        self.function, self.reorder, self.last = function, reorder, last
+        self.function, self.reorder, self.last, self.__module__ = function, reorder, last, function.__module__
         self.name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.cached_property
@@ -129,7 +128,7 @@ class Kernel:
                 return None
             found = machine_code.stored(self.key)
             if found is None:
-                from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
+                from contin.kernels import compiler  # numba takes .3 s, and is needed the first time only
 
                 found = compiler.machine_code(self.function, self.reorder, self.entry)
                 machine_code.keep(self.key, found)

@@ -272,7 +272,7 @@ class _Self(tuple[Any, ...]):
 
     @property
     def kernel(self) -> Any:
-        """The `contin.functions.kernel.Kernel`."""
+        """The `contin.kernels.kernel.Kernel`."""
         return self[3]
 
 
