@@ -292,7 +292,7 @@ class Collocation(Composed):
         return inside, Term(self, self._boundary, self._at_ends, rows_at_ends, lambda w: w[None, first:last], by_x)
 
     @property
-    def _means(self) -> Term:
+    def _column_term(self) -> Term:
         """Integrals of the functionals."""
         widths = self.gauss_weights
         return Term(self, self._functionals, self._inside, lambda f: widths @ f, lambda w: widths[:, None] * w, self._to_nodes)

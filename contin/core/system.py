@@ -403,7 +403,7 @@ class Composed(System):
 
     @property
     @abstractmethod
-    def _means(self) -> Term:
+    def _column_term(self) -> Term:
         """The functionals that `integrated` names."""
 
     @property
@@ -418,7 +418,7 @@ class Composed(System):
 
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals, in their order."""
-        return self._means.values(x) if self.integrated else np.empty(0)
+        return self._column_term.values(x) if self.integrated else np.empty(0)
 
     @property
     def _evaluated(self) -> Sequence[Batch]:
@@ -451,12 +451,12 @@ class Composed(System):
         """Return the derivatives of a column (a parameter or functional) by x, shape (size,); None where they are not known."""
         if name not in self.integrated:
             return super().column_gradient(x, name)
-        term, at = self._means, self.integrated.index(name)
+        term, at = self._column_term, self.integrated.index(name)
         return term.by_x(term.weights(self._unit(name))[:, at, None] * term.slopes(x, term.columns)[:, at])
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
-        return self._means.bent(x, self._unit(name), v) if name in self.integrated else super().column_bent(x, name, v)
+        return self._column_term.bent(x, self._unit(name), v) if name in self.integrated else super().column_bent(x, name, v)
 
     def _unit(self, name: str) -> Array:
         """Return the weights of the functionals in one of them."""

@@ -241,7 +241,7 @@ class Algebraic(Spectral, Composed):
         return (self._of_points(self._residual),)
 
     @property
-    def _means(self) -> Term:
+    def _column_term(self) -> Term:
         return self._of_points(self._functionals, 1)
 
     def _of_points(self, batch: Batch, count: int | None = None) -> Term:

@@ -70,7 +70,10 @@ def equations():
 
 
 def henon():
-    problem = MapProblem(lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * math.sin(u.x)), ["x", "y"], {"a": 0.6, "b": 0.3})
+    problem = MapProblem(
+        lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * math.sin(u.x)), ["x", "y"], {"a": 0.6, "b": 0.3},
+        functionals={"work": lambda u, p: p.a * u.x**2 * u.y},
+    )  # fmt: skip
     return problem.discretized(["a", "b"], {"rounds": 3})
 
 
@@ -120,13 +123,20 @@ def test_bent_is_the_derivative_of_the_transposed_product(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["boundary value", "boundary value, scaled", "cycle", "cycle, scaled", "equations", "equations, scaled"]
+    "name", ["boundary value", "boundary value, scaled", "cycle", "cycle, scaled", "equations", "equations, scaled", "map"]
 )
 def test_second_derivatives_of_columns(name):
     system, x, (a, _, _), _ = prepared(name)
     expected = System.column_bent(system, x, "work", a)
     assert system.column_bent(x, "work", a) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert not system.column_bent(x, system.free[0], a).any()
+
+
+def test_a_column_with_an_infinite_slope_leaves_the_others_alone():
+    functionals = {"root": lambda u, p: math.sqrt(u.x), "double": lambda u, p: 2 * u.x}
+    system = AlgebraicProblem(lambda u, p: (u.x - p.a,), ["x"], {"a": 0.0}, functionals).discretized(["a"], {})
+    with np.errstate(all="ignore"):
+        assert system.column_gradient(np.zeros(2), "double").tolist() == [2.0, 0.0]
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
