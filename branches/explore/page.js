@@ -172,7 +172,8 @@ function connect() {
   $("save").onclick = (event) => event.target.dataset.save && save(event.target.dataset.save);
   $("told").onclick = () => tell("");
   document.addEventListener("keydown", keyPressed);
-  window.addEventListener("beforeprint", () => ($("printed").innerHTML = SHAPES && !now.branch.leftOut ? ribbonSvg("none") : ""));
+  window.addEventListener("beforeprint", toPaper);
+  window.addEventListener("afterprint", fromPaper);
   window.addEventListener("popstate", () => restore(location.hash));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   new ResizeObserver(placeMarker).observe($("diagram"));
@@ -213,6 +214,28 @@ function mapMoved() {
   placeMarker();
   drawLegend();
   remember();
+}
+
+const PAPER = { width: 640, height: 280 }; // pixels of a picture on a page
+
+/** Before the page is printed: light colours, pictures as wide as paper, and the strip as flat polygons, as WebGL is not printed. */
+function toPaper() {
+  document.documentElement.dataset.theme = "light";
+  now.zoomed = { x: [...shownRange("x")], y: [...shownRange("y")] };
+  const layout = { ...diagramLayout(), ...PAPER };
+  layout.xaxis.range = now.zoomed.x;
+  layout.yaxis.range = now.zoomed.y;
+  Plotly.react("diagram", diagramTraces(), layout);
+  drawLegend();
+  if (!SHAPES) Plotly.react("ribbon", profileTraces(), { ...profileLayout(), ...PAPER });
+  else $("printed").innerHTML = now.branch.leftOut ? "" : ribbonSvg("none");
+}
+
+async function fromPaper() {
+  delete document.documentElement.dataset.theme;
+  await redraw();
+  for (const id of SHAPES ? ["diagram"] : ["diagram", "ribbon"]) await Plotly.Plots.resize(id);
+  await zoom(now.zoomed);
 }
 
 /** Unpack the library that draws, and run it. */

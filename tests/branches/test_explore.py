@@ -331,6 +331,9 @@ def test_page_draws_without_errors(page, browser):
     seen = "[...document.querySelectorAll('{}')].some((e) => e.checkVisibility())"
     assert browser.js(seen.format("#printed path")) and not browser.js(seen.format("button, select, input, #ribbon"))
     browser.call("Emulation.setEmulatedMedia", media="")
+    browser.js("window.dispatchEvent(new Event('afterprint'))")
+    browser.until("document.querySelector('#diagram .main-svg').clientWidth === document.getElementById('diagram').clientWidth")
+    assert browser.errors == []
     if page.stem != "fig12":
         return  # the longest legend is in Fig. 12
     browser.open(page, width=380, height=800)
