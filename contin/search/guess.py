@@ -184,7 +184,7 @@ class Parsed(NamedTuple):
             raise ProblemError(f"guess: a Point of {found.shape[1]} states for a problem of {count}")
         if found.shape[1] != count:
             raise ProblemError(f"guess: {found.shape[1]} numbers, must be the {count} states")
-        return np.array(np.broadcast_to(found, (len(t), count)), order="C")  # as kernels take it
+        return np.array(np.broadcast_to(found, (len(t), count)), order="C")
 
     def mapped(self, function: Callable[[Array], Array], count: int) -> Parsed:
         """Return the guess for a problem whose states are a function of these."""
@@ -309,7 +309,7 @@ def first_guess(
             return system, with_guessed_multipliers(system, guess.states(system.nodes, problem.dimension))
     states = guess.states(system.nodes / problem.order, count)
     if periods_of(problem).any():
-        system, states = _with_rounds(system, states.copy(), parameters)
+        system, states = _with_rounds(system, states, parameters)
     x = system.pack(states, values)
     return system.with_reference(x), x
 
