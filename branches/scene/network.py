@@ -254,12 +254,6 @@ class NetworkScene(StagedScene):
             for field, word in words.items():
                 yield f"{where}: {field}: {word} is the direction ({', '.join(f'{x:.6g}' for x in self.axes_at(name)[word])})"
 
-    def column_words(self, name: str) -> tuple[str, str]:
-        """Return the words of a column, and those of its axis."""
-        from branches.scene.words import of_networks
-
-        return of_networks(self.strip(), self.loads, name)
-
     def first(self, grows: Mapping[str, float], options: dict[str, Any]) -> tuple[Any, str]:
         """As `StagedScene.first`; what a floating network is turned by is small, where it ``grows`` from zero."""
         from contin import ContinError

@@ -15,6 +15,7 @@ from branches.scene.fields import ConfigError
 from branches.scene.labels import label_of, without_round_off
 from branches.scene.open_strip import StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
+from branches.scene.words import words_of
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
 from ribbon_model.changed_supports import held_at, with_supports
@@ -265,7 +266,7 @@ class OpenStage(Stage):
         return Columns((*columns, *(self._column(name, error_of(name), role=FOUND) for name in self.scene.found_names)), True)
 
     def _column(self, name: str, error, role: str = NUMBER) -> Column:
-        words, axis = self.scene.column_words(name)
+        words, axis = words_of(self.scene, name)
         return Column(name, words, error=error, role=role, axis=axis)
 
     def values(self, point: Point, names: Sequence[str]) -> Mapping[str, float]:

@@ -313,10 +313,6 @@ class StagedScene(Scene):
     def replacing(self, stage: int) -> Sequence[str]:
         """Return the names of the loads that replace reactions in a stage."""
 
-    @abstractmethod
-    def column_words(self, name: str) -> tuple[str, str]:
-        """Return the words of a column, and those of its axis."""
-
     def told_axes(self, stage: int) -> Iterable[str]:
         """Return what the words of directions mean that a stage brings."""
         return ()
@@ -425,12 +421,6 @@ class OpenScene(StagedScene):
         length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
         modulus = "1" if sizes is None else f"1 ({self.modulus:.12g} N m^2)"
         return f"bending modulus B = {modulus}, length L = {length}"
-
-    def column_words(self, name: str) -> tuple[str, str]:
-        """Return the words of a column, and those of its axis."""
-        from branches.scene.words import of_strips
-
-        return of_strips(name)
 
     def replacing(self, stage: int) -> Sequence[str]:
         """Return the names of the loads that replace reactions in a stage."""

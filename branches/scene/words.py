@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container
 
+from branches.scene.open_strip import StagedScene
 from ribbon_model.ends import ANGLES, DIRECTIONS
-from ribbon_model.network import ASSEMBLY, AXES, FOLLOWER, MOVES, Network, column
+from ribbon_model.network import ASSEMBLY, AXES, FOLLOWER, MOVES, column
 
 #: Words of the columns, and those of axes. Lengths are over that of the strip, unless the scene has dimensions.
 _OF_STRIPS = {
@@ -58,15 +58,13 @@ _OF_NETWORKS = {
 }
 
 
-def of_strips(name: str) -> tuple[str, str]:
-    """Return the words of a column of an open strip, and those of its axis."""
-    return _OF_STRIPS.get(name, (name, name))
-
-
-def of_networks(network: Network, loads: Container[str], name: str) -> tuple[str, str]:
-    """Return the same of a network; ``loads`` are those of its scene."""
+def words_of(scene: StagedScene, name: str) -> tuple[str, str]:
+    """Return the words of a column, and those of its axis."""
+    own, network = _OF_STRIPS.get(name, (name, name)), scene.strip()
+    if scene.KIND == "open strip":
+        return own
     joint, _, last = name.rpartition("_")
-    replaced = None if name in loads else re.fullmatch(r"(\w+)_(force_([xyz])|moment)", name)
+    replaced = None if name in scene.loads else re.fullmatch(r"(\w+)_(force_([xyz])|moment)", name)
     if replaced and replaced[1] in network.joints:
         place, _, axis = replaced.groups()
         what = f"dead force at {place} along {axis}" if axis else f"dead moment at the hinge {place}"
@@ -87,6 +85,6 @@ def of_networks(network: Network, loads: Container[str], name: str) -> tuple[str
         return f"prescribed rotation of {joint}: {last}", f"{last} of {joint}"
     number, _, section = name.rpartition("_")
     if section in network.sections:
-        words, axis = of_strips(number)
+        words, axis = _OF_STRIPS.get(number, (number, number))
         return f"{words}, of {section}", f"{axis}, {section}"
-    return of_strips(name)
+    return own
