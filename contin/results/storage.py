@@ -35,6 +35,8 @@ from contin.results.point import Point
 
 Result = TypeVar("Result")
 
+#: Of several segments or of one, a problem with these states and names is the same.
+_SEVERAL = "Segmented"
 #: First entry of every file.
 _FORMAT = "contin branch 3"
 #: First entry of files of diagrams: each branch is a file in the file.
@@ -131,7 +133,7 @@ def _statement(problem: BoundaryValueProblem | AlgebraicProblem) -> dict[str, An
     kinds = (kind.__name__ for kind in type(problem).__mro__ if kind.__module__.startswith(_PACKAGE))
     symmetry: Any = getattr(problem, "symmetry") if declared(problem, "order") > 1 else None  # noqa: B009
     return {
-        "kind": next(kinds), "states": list(problem.state_names), "names": list(problem.parameters),
+        "kind": next(kinds).removeprefix(_SEVERAL), "states": list(problem.state_names), "names": list(problem.parameters),
         "symmetry": symmetry if symmetry is None else symmetry.tolist(),
     }  # fmt: skip
 
@@ -199,7 +201,7 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
             stated = stated.on_totals
         if head["kind"] == CycleProblem.__name__ and isinstance(stated, AlgebraicProblem):
             stated = CycleProblem.of(stated)
-        own = _statement(stated)
+        own, head["kind"] = _statement(stated), str(head["kind"]).removeprefix(_SEVERAL)
         if any(head[name] not in (own[name], _UNTOLD) for name in own):
             raise ProblemError(f"{str(path)!r} is of another problem: {_said(head)}, not {_said(own)}")
         systems = [_system(stated, head, arrays, i) for i in range(len(head["degrees"]))]
