@@ -8,15 +8,29 @@ N.((x0 - c) x (x - c))/2, which is subtracted. Elsewhere such a pressure has no 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
 from ribbon_model.ends import LOOSE, Vector
 from ribbon_model.members import FINISH, START, JointEnd, numbers_of
 
-if TYPE_CHECKING:
-    from ribbon_model.network import Network
+
+class Drawn(Protocol):
+    """What is asked of a network: its strips as drawn, its joints and how these are held."""
+
+    members: Mapping[str, Any]
+    joints: Mapping[str, Any]
+    held: Mapping[str, Any]
+    pressure_normal: Vector
+
+    def joint_at(self, end: JointEnd) -> str:
+        """Return the joint at an end."""
+
+    def said(self, end: JointEnd) -> str:
+        """Return what messages call an end."""
+
 
 #: The side on which a member is pressed, +1 where it is drawn around the area and -1 against that; and the place c.
 Fan = tuple[int, Vector]
@@ -24,7 +38,7 @@ Fan = tuple[int, Vector]
 _ADVICE = "so a pressure in a plane has no potential; follow follower_pressure, which acts against the normal of each strip"
 
 
-def fans(network: Network) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fan]]]:
+def fans(network: Drawn) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fan]]]:
     """Return the fan of each member; and the ends that slide, with their joint, and +1 in a fan where a row ends, else -1.
 
     Raises
@@ -52,7 +66,7 @@ def fans(network: Network) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fa
     return found, slides
 
 
-def _row(network: Network, first: str) -> tuple[list[tuple[str, int]], bool]:
+def _row(network: Drawn, first: str) -> tuple[list[tuple[str, int]], bool]:
     """Return strips that follow each other, 1 where one is passed from start to finish, else -1; and whether they close."""
     row = [(first, 1)]
     for way in (1, -1):
@@ -74,7 +88,7 @@ def _row(network: Network, first: str) -> tuple[list[tuple[str, int]], bool]:
     return row, False
 
 
-def _slides(network: Network, each: JointEnd) -> bool:
+def _slides(network: Drawn, each: JointEnd) -> bool:
     """Return whether the last end of a row slides in the plane; raise ValueError if it is free there."""
     end = network.held.get(network.joint_at(each))
     fixed = np.array([*(end.held if end else ()), network.pressure_normal])
