@@ -80,6 +80,8 @@ def _through_corners(system: Algebraic, x: Array, newton: Newton) -> Corrected |
         The equations jump on the way.
     """
     problem, names, t = system.problem, system.problem.state_names, "part_of_the_way_"
+    if not np.isfinite(system.residual(x)).all():
+        return None
     given = returning(problem.residual, Signature(names, tuple(problem.parameters), times=False))
     known = dict(zip(problem.parameters, map(float, system.all_parameters(x))))
     u, p = named_values(names)(*map(float, system.states(x)[0])), named_values(tuple(known))(*known.values())
