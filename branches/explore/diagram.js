@@ -26,7 +26,10 @@ function hoverText(branch, i) {
     [kind, word, index] = stability(branch, i);
   const special = mark && mark.kind in SYMBOLS ? `<br>${(mark.kind !== "user" && SYMBOLS[mark.kind][2]) || mark.name}` : "";
   const columns = STRIPS ? COLUMNS : [now.x, now.y];
-  const values = columns.map((name) => `<br>${AXES.get(name).brief} = ${digits(branch.columns[name][i])}`).join("");
+  const values = columns
+    .map((name) => [AXES.get(name), branch.columns[name][i]])
+    .map(([{ brief, decimals }, value]) => `<br>${brief} = ${digits(value, decimals)}`)
+    .join("");
   const known = branch.columns.index ? `<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}` : "";
   return `<b>${escaped(nameOf(branch))}</b>${special}${values}${known}`;
 }

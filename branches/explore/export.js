@@ -3,7 +3,7 @@
 
 function csv(branch) {
   const names = Object.keys(branch.columns).filter((name) => name !== "elastic"), // the file holds the others
-    head = [...(branch.circle ? [] : ["point", "label"]), ...names].join(",");
+    head = [...(branch.circle ? [] : ["point", "label"]), ...names.map((name) => (DATA.told && AXES.has(name) ? AXES.get(name).brief : name))].join(",");
   const rows = Array.from({ length: branch.size }, (_, i) =>
     [...(branch.circle ? [] : [i, branch.labels[i] || ""]), ...names.map((name) => branch.columns[name][i])].join(","),
   );

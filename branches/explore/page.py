@@ -27,8 +27,8 @@ WORDS = {
     "branches": {"hue": "branch", "state": "The states at the chosen point"},
 }
 WORDS["open"] = {"hue": "stage", "state": WORDS["strips"]["state"]}
-#: Width of strips in percent of their length, at first; that of open strips is that of pictures.
-_WIDTHS = {"strips": "3", "branches": "3", "open": "6"}
+#: Width of closed strips in percent of their length, at first; of open strips, the page's data has it.
+_WIDTH = 3.0
 #: Classes of the page, by which parts of it are hidden.
 CLASSES = {"strips": "strips", "branches": "branches", "open": "branches of-open"}
 
@@ -45,7 +45,7 @@ def assemble(data: dict) -> str:
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip
-    parts |= {"kind": CLASSES[data["kind"]], "width": _WIDTHS[data["kind"]]} | WORDS[data["kind"]]
+    parts |= {"kind": CLASSES[data["kind"]], "width": f"{data.get('width', _WIDTH):g}"} | WORDS[data["kind"]]
     pieces = template.split("{{")
     filled = [pieces[0]]
     for piece in pieces[1:]:

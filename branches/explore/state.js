@@ -12,7 +12,7 @@ const FAMILIES = DATA.families.map((family) => ({
     ...family.circles.map((about) => new Branch(about, family)),
   ],
 }));
-const AXES = new Map(DATA.axes.map(([name, title, brief]) => [name, { title, brief }]));
+const AXES = new Map(DATA.axes.map(([name, title, brief, decimals = 8]) => [name, { title, brief, decimals }]));
 const COLUMNS = DATA.told || [...AXES.keys()].filter((name) => name !== "elastic" && name !== "index"); // in read-outs
 const now = { family: FAMILIES[0], branch: null, s: 0, playing: false, x: DATA.shown[0], y: DATA.shown[1] };
 
@@ -39,13 +39,13 @@ const short = (value) =>
       .replace(/(\.\d*?)0+$/, "$1")
       .replace(/\.$/, ""),
   );
-const digits = (value) => minus(Math.abs(value) < 1e6 ? value.toFixed(8) : value.toPrecision(9));
+const digits = (value, decimals = 8) => minus(Math.abs(value) < 1e6 ? value.toFixed(decimals) : value.toPrecision(9));
 /** A value at a place of a branch: between computed points those digits that hold, after a sign that it is interpolated. */
-function digitsAt(branch, name, s, most = 8) {
+function digitsAt(branch, name, s, most = AXES.get(name).decimals) {
   const value = branch.value(name, s),
     error = branch.uncertainty(name, s);
-  if (error === 0) return most === 8 ? digits(value) : minus(value.toFixed(most));
-  if (!(error < Math.abs(value) || error < 1)) return `≈ ${minus(value.toPrecision(1))}`;
+  if (error === 0) return digits(value, most);
+  if (!(error < Math.abs(value) || error < 10 ** (8 - most))) return `≈ ${minus(value.toPrecision(1))}`;
   return `≈ ${minus(value.toFixed(Math.min(most, Math.max(0, Math.floor(-Math.log10(error))))))}`;
 }
 const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);

@@ -29,6 +29,7 @@ from branches.scene.labels import ON_PAGE, START, kind_of, label_of
 from branches.store.branch import StoredBranch
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED
+from branches.store.open_branch import OPEN_WIDTH
 from branches.store.read import read_branch, read_kind
 from contin import ConvergenceError, Newton
 from contin.lowlevel import Collocation, Label, correct, levels, point_of
@@ -263,6 +264,8 @@ def states_of(shapes: Iterable[Shape]) -> np.ndarray:
 _NODES = 97
 #: A read-out has room for so many columns, without a need to scroll; of more, it has the numbers and what is conjugate to them.
 _ROOM = 24
+#: Decimals of values on the page, of a unit of the strip. Those from the ninth on are of round-off.
+_DIGITS = 8
 #: Distance of the eye from the middle of a state, in units of half the frame, and the part of it that a state fills.
 _FAR, _FILLED = 1.1, 0.92
 
@@ -275,11 +278,13 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     Raises
     ------
     StoreError
-        A file of another kind, or without a column in common with the others.
+        A file of another kind or in other units, or without a column in common with the others.
     """
     kind = read_branch(files[0]).scene.KIND
     branches = [(path, read_kind(path, kind)) for path in files]
     first = branches[0][1]
+    if len(units := {branch.titled("energy") for _, branch in branches}) > 1:
+        raise StoreError(f"the results are in several units: {', '.join(sorted(units))}; a page shows results in the same ones")
     parameter = first.followed(int(first.points["stage"][-1]))
     common = set.intersection(*(set(branch.points.dtype.names) for _, branch in branches))
     columns = [name for name in first.columns.shown() if name in common]
@@ -300,8 +305,11 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     return {
         "title": title or first.config["title"] or first.scene.name, "kind": "open",
         "axes": [
-            (name, name if words == name else f"{words} ({name})", name) for name, words, _ in first.columns.axes(varying)
+            (name, brief if words == name else f"{words} ({brief})", brief, max(0, _DIGITS - math.floor(math.log10(factor))))
+            for name, words, _ in first.columns.axes(varying)
+            for brief, factor in [(first.titled(name), first.scene.factor(name))]
         ],
+        "width": 100 * (first.width_at(1.0, None) or OPEN_WIDTH),
         "shown": shown, "told": [name for name in varying if len(varying) <= _ROOM or name in brief], "scale": _FILLED / reach,
         "eye": (_FAR * first.view.axes[2]).tolist(),
         "families": [{"name": "stages", "parameter": parameter, "branches": stages, "circles": []}],
@@ -357,7 +365,8 @@ def _stage(path: Path, branch: StoredBranch, number: int, columns: list[str], sn
     labels = [branch.points["label"][row].decode() for row in rows]
     names = {int(event["point"]): event["name"].decode() for event in branch.events}
     last, singular = number == branch.points["stage"][-1], [bool(label) and label_of(label).singular for label in labels]
-    table = {name: branch.points[name][rows] for name in (*columns, "arclength", "index")}
+    table = {name: branch.measured(name)[0][rows] for name in columns}
+    table |= {name: branch.points[name][rows] for name in ("arclength", "index")}
     table["index"] = np.where(singular, UNKNOWN, table["index"])  # there, that of one side is as good as that of the other
     if (table["index"] == UNKNOWN).all():  # as under loads without an energy
         del table["index"]

@@ -23,7 +23,7 @@ UNITS = {
     "J": {"J": "1", "mJ": "1e-3", "uJ": "1e-6"},
     "N": {"N": "1", "mN": "1e-3", "kN": "1e3"},
     "rad": {"rad": "1", "deg": "0.017453292519943295"},
-    "": {},
+    "": {"%": "1e-2"},
 }
 
 
@@ -44,14 +44,14 @@ def quantity(text: str, unit: str) -> float:
     try:
         return float(text)
     except ValueError:
-        digits, name = re.fullmatch(r"(.*?)\s*([^\W\d]*)\s*", text, re.DOTALL).groups()
+        digits, name = re.fullmatch(r"(.*?)\s*([^\W\d]*|%)\s*", text, re.DOTALL).groups()
     if name in units:
         try:
             return float(Decimal(digits) * Decimal(units[name]))  # as if it were written in SI units
         except InvalidOperation:
             pass
     known = [name for name in units if name.isascii()]
-    more = f" (in {unit}), or one with a unit: {', '.join(known[:-1])} or {known[-1]}" if known else ""
+    more = f" (in {unit}), or one with a unit: {', '.join(known[:-1])} or {known[-1]}" if unit else ""
     raise ValueError(f"{text!r} must be a number{more}")
 
 

@@ -373,9 +373,13 @@ class StoredBranch(ABC):
         found = {}
         for name in self.points.dtype.names:
             kind = self.points.dtype[name].kind
-            values, unit = self.measured(name) if kind == "f" else (self.points[name], "")
-            found[f"{name} [{unit}]" if unit else name] = np.char.decode(values, "utf-8") if kind == "S" else values
+            values, title = (self.measured(name)[0], self.titled(name)) if kind == "f" else (self.points[name], name)
+            found[title] = np.char.decode(values, "utf-8") if kind == "S" else values
         return found
+
+    def titled(self, name: str) -> str:
+        """Return the name of a column with its unit, as in ``distance [m]``."""
+        return f"{name} [{unit}]" if (unit := self._unit(name)) else name
 
     def to_pandas(self, units: bool = False):
         """Return the table of points as a ``pandas.DataFrame``, as it is stored or in its units (`in_units`).

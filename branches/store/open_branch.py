@@ -26,7 +26,7 @@ from ribbon_model.shape import Shape, interpolated
 #: Networks are drawn flat, often, with strips across their plane: seen from ahead, those that stand upright would be lines.
 _VIEW = View(-70.0, 20.0)
 #: Width of drawn strips of unknown dimensions, over the length of the longest.
-_WIDTH = 0.06
+OPEN_WIDTH = 0.06
 
 
 class OpenBranch(StoredBranch):
@@ -180,7 +180,7 @@ class OpenBranch(StoredBranch):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         parts = [part for strip in strips for part in parts_of(strip)]
         if asked is None:
-            asked = self.width_at(1.0, None) or _WIDTH * self.shape_length
+            asked = self.width_at(1.0, None) or OPEN_WIDTH * self.shape_length
         return min([asked, *(ROOM * widest(part) for part in parts)])
 
     # --- places ---------------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def parser() -> Parser:
         parser.add_argument(
             f"--{name.replace('_', '-')}", type=Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
         )
-    parser.add_argument("--yield-strain", type=float, metavar="X", help="mark states with a larger strain")
+    parser.add_argument("--yield-strain", type=Quantity(""), metavar="X", help="mark states with a larger strain, as in 0.2%%")
     parser.add_argument(
         "--want", type=Quantity("J"), metavar="J", help="which dimensions give a stable loop with a barrier of J, or 5mJ"
     )

@@ -1,17 +1,22 @@
 """What scenes of any version say and what files of 0.2 hold: sentences word by word, results that are opened and resumed."""
 
+import base64
 import gzip
 import json
+import math
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from branches.explore.gather import gather
+from branches.explore.page import assemble
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
+from branches.store.files import StoreError
 from branches.store.read import read_branch
 
 KEPT = Path(__file__).parent / "kept"
@@ -47,6 +52,24 @@ def test_a_file_of_the_version_before_is_read(name, tmp_path):
     assert branch.shape(int(branch.kept()[-1])).centreline.shape[1] == 3
     assert set(branch.points.dtype.names) <= set(branch.columns.table("points"))
     assert set(branch.events.dtype.names) <= set(branch.columns.table("events"))
+
+
+def test_a_page_has_the_units_of_the_table(tmp_path):
+    """A strip of 10 mm x 400 mm: values in m and N as `in_units` has them, and its width in percent of its length."""
+    path = unpacked("dimensions", tmp_path)
+    branch, page = read_branch(path), gather([str(path)])
+    table, name = branch.in_units(), "F_tangent [N]"
+    title, brief, decimals = next(axis[1:] for axis in page["axes"] if axis[0] == "F_tangent")
+    assert name in title and brief == name and decimals == 8 + 1 - math.ceil(math.log10(branch.scene.factor("F_tangent")))
+    first = page["families"][0]["branches"][0]["columns"]
+    for column in ("distance", "F_tangent"):
+        kind, text = first[column][0], first[column][1:]
+        values = np.frombuffer(base64.b64decode(text), "<f8")
+        assert kind == "d" and np.array_equal(values, table[branch.titled(column)][: len(values)])
+    assert values.min() < -1.0 and math.isclose(page["width"], 2.5) and 'value="2.5"' in assemble(page)
+    other = unpacked("open", tmp_path)
+    with pytest.raises(StoreError, match=r"several units: energy \[B/L\], energy \[J\]"):
+        gather([str(path), str(other)])
 
 
 @pytest.mark.sample(1)

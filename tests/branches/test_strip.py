@@ -16,7 +16,7 @@ from branches.scene.sweep import Sweep
 from branches.scene.units import quantity
 from branches.strip import report as strip_report
 from branches.strip import states as strip_states
-from branches.strip.__main__ import main
+from branches.strip.__main__ import main, parser
 from branches.strip.report import assumptions, barrier, barriers_at, chart, deviations, dimensions
 from branches.strip.states import buckled, circles, ways_out
 from ribbon_model.exact_finite_width import curve
@@ -215,6 +215,13 @@ def test_numbers_in_other_units_are_doubted():
     in_millimetres = Strip(5.65, 0.65, 3000.0, 143.0, 0.3, 210.0)
     names = [line.split()[1] for line in assumptions(in_millimetres, circles(in_millimetres)) if "unusual" in line]
     assert names == ["width", "thickness", "length", "youngs_modulus"]
+
+
+def test_a_strain_may_be_in_percent(capsys):
+    assert parser().parse_args([*OPTIONS, "--yield-strain", "0.2%"]).yield_strain == 0.002
+    with pytest.raises(SystemExit):
+        parser().parse_args([*OPTIONS, "--yield-strain", "0.2mm"])
+    assert "'0.2mm' must be a number" in capsys.readouterr().err
 
 
 def test_cautions():
