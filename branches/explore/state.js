@@ -106,5 +106,6 @@ function story() {
       ? `This shape has less symmetry than the branch (${branch.m}, ${branch.n}) that it comes from.`
       : `This branch leaves the ${loopName(branch.m)} with ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, and ${to}.`;
   if (mark && mark.kind === "fold") return `${way} ${foldWords(branch, s)}`;
+  if (mark && mark.kind === "end" && mark.point === branch.size - 1) return `${way} The run stopped: ${branch.stop}.`;
   return `${way} ${(mark && MARK_WORDS[mark.kind]) || STEADY[kind]}`;
 }

@@ -313,7 +313,9 @@ def describe_node(node) -> str:
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
         return f"stops at {node['kappa_n']:.10g}, the scene's own limit"
-    return f"{node['kind']} at {node['kappa_n']:.6f}"
+    return (
+        f"{node['kind']} at {node['kappa_n']:.6f}{' (' + node['what'] + ')' if node['kind'] == 'end' and node['what'] else ''}"
+    )
 
 
 # --- the preview: from the exact quadrature, without continuation ----------------------------------------------------

@@ -12,7 +12,7 @@ import numpy as np
 
 from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns, error_of
 from branches.scene.fields import ConfigError
-from branches.scene.labels import label_of, without_round_off
+from branches.scene.labels import START, label_of, without_round_off
 from branches.scene.open_strip import StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from branches.scene.words import words_of
@@ -312,6 +312,26 @@ class OpenStage(Stage):
         told = what if "=" not in what and (not singular or "kernel" in what) else ""  # not the value once more
         kind = f" ({told})" if told else ""
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
+
+    def described(self, events: np.ndarray) -> list[str]:
+        """Return all labelled points in words, and the branch point at which the states of this stage stop being stable."""
+        own = [event for event in events if event["stage"] == self.number]
+        names = [(event["label"].decode(), event["name"].decode()) for event in own]
+        changes = [at for at, event in enumerate(own) if 0 in (event["index_before"], event["index_after"])]
+        if not changes or own[at := changes[-1]]["index_after"] <= 0 or names[at][0] != Label.BRANCH_POINT:
+            return super().described(events)
+        used = [
+            stage.place_among(names) for number, stage in enumerate(self.scene.stages) if (stage.stage or number) == self.number
+        ]
+        if at in used:
+            return super().described(events)
+        tag = f"{names[at][0]} {sum(label == names[at][0] for label, name in names[: at + 1] if name != START)}"
+        before = f"stage: {self.number} and " if self.number < len(self.scene.stages) else ""
+        way = f"a stage with {before}start_at: {tag} follows the branch that leaves there"
+        if own[at]["kernel"] != 1:
+            way = "several modes are neutral there; a phase or an imperfection tells them apart"
+        here = self._shown(self.follow, own[at][self.follow])
+        return [*super().described(events), f"stage {self.number}: unstable beyond {here} ({tag}): {way}"]
 
     def _with_error(self, event: np.void, column: str) -> str:
         """Return a column of a labelled point with its error, '' where it has none."""

@@ -95,10 +95,14 @@ class ClosedBranch(StoredBranch):
     def marks(self) -> Iterator[Mark]:
         for event in self.events:
             letters = event["label"].decode()
-            kind = kind_of(letters, event["name"].decode(), self.reason, bool(self.scene.origin))
+            kind = kind_of(letters, name := event["name"].decode(), self.reason, bool(self.scene.origin))
             strip = self.scene.strip if kind == "user value" else None
             natural = strip and math.isclose(event["kappa_n"], Strip(**strip).kappa_n)
-            word = "natural curvature of the strip" if natural else _WORDS.get(kind, kind)
+            word = (
+                "natural curvature of the strip"
+                if natural
+                else _WORDS.get(kind, f"end: {name}" if kind == "end" and name else kind)
+            )
             yield Mark(int(event["point"]), label_of(letters), kind == "leaves", word)
 
     def colour(self, stage: int) -> str:

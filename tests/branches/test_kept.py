@@ -12,6 +12,7 @@ import pytest
 
 from branches.explore.gather import gather
 from branches.explore.page import assemble
+from branches.graph.closed import describe_node
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
@@ -70,6 +71,13 @@ def test_a_page_has_the_units_of_the_table(tmp_path):
     other = unpacked("open", tmp_path)
     with pytest.raises(StoreError, match=r"several units: energy \[B/L\], energy \[J\]"):
         gather([str(path), str(other)])
+
+
+def test_an_end_says_why_in_pictures_and_lists(tmp_path):
+    branch, name = read_branch(unpacked("closed", tmp_path)), "the end of the convex strain energy"
+    branch.events["label"][-1], branch.events["name"][-1] = b"EP", name.encode()
+    assert [mark.word for mark in branch.marks()][-1] == f"end: {name}"
+    assert describe_node({"kind": "end", "kappa_n": 9.302262, "what": name}) == f"end at 9.302262 ({name})"
 
 
 @pytest.mark.sample(1)

@@ -81,6 +81,19 @@ def tip(tmp_path_factory, root):
     return path
 
 
+def test_a_run_says_where_stability_ended_and_how_to_go_on(tmp_path, capsys):
+    """A strip on edge buckles at 4.0126 sqrt(B C) (Michell, Prandtl), C = 2 B/(1 + nu). The stage that is advised runs."""
+    said = []
+    for more in ("", ", {follow: force_width, to: -5.1, start_at: BP 1}"):
+        scene = parse(TIP.replace("}]", "}" + more + "]"), "scene")
+        assert run_scene(scene, tmp_path / f"{bool(more)}.h5", Display(quiet=True)) == "complete"
+        said.append([line.strip() for line in capsys.readouterr().out.splitlines() if "unstable" in line])
+    assert said[1] == [] and len(said[0]) == 1
+    words = r"stage 1: unstable beyond force_width = (\S+) \(BP 1\): a stage with start_at: BP 1 follows .*"
+    found = re.fullmatch(words, said[0][0])
+    assert float(found[1]) == pytest.approx(-4.0126 * math.sqrt(2 / 1.3), rel=2e-5)
+
+
 def test_the_file(tip):
     branch = read_branch(tip)
     assert isinstance(branch, OpenBranch) and branch.status == "complete"
