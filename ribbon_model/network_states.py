@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections import namedtuple
 from collections.abc import Sequence
@@ -17,9 +18,12 @@ from ribbon_model import law_end
 from ribbon_model.ends import Vector
 from ribbon_model.equilibrium import CENTRELINE, FRAME, moment_on_axes, strains_of
 from ribbon_model.members import START, JointEnd, numbers_of
-from ribbon_model.section import Section
+from ribbon_model.section import KINDS, NATURAL, Section
 from ribbon_model.shape import Shape, shape_of
 from ribbon_model.statement import AXES, MOVES, Statement, at_arm, axes_of, joint_frame
+
+#: Kinds of the numbers that prescribe a joint.
+_PRESCRIBED = (*["length"] * 3, *["angle"] * 3)
 
 
 class States(Statement):
@@ -96,9 +100,22 @@ class States(Statement):
     @property
     def found_names(self) -> tuple[str, ...]:
         """Names of what `found` gives."""
-        places = [f"{column(joint)}_{axis}" for joint in self.joints for axis in AXES]
-        reactions = [f"{kind}_{joint}_{axis}" for joint in self.held for kind in "FM" for axis in AXES]
-        return (*places, *reactions, *(["floating"] if self.floats else []))
+        return (*self._found_kinds, *(["floating"] if self.floats else []))
+
+    @property
+    def _found_kinds(self) -> dict[str, str]:
+        places = {f"{column(joint)}_{axis}": "length" for joint in self.joints for axis in AXES}
+        kinds = itertools.product(self.held, ("force", "moment"), AXES)
+        return places | {f"{kind[0].upper()}_{joint}_{axis}": kind for joint, kind, axis in kinds}
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Kinds of numbers and of what is found, from which units follow: length, angle, force, ...; ratios are left out."""
+        angles = [each.angle for joint in self.joints.values() for each in joint.members if isinstance(each.angle, str)]
+        held = {name: kind for joint in self.held for name, kind in zip(self.numbers_at(joint), _PRESCRIBED) if name}
+        loads = {name: "moment" if load.moments else "force" for name, load in self.loads.items()}
+        own = {self.full_name(section, name): KINDS[name] for section in self.sections for name in NATURAL}
+        return KINDS | own | dict.fromkeys(angles, "angle") | held | loads | self._found_kinds
 
     def found(self, point: Point) -> dict[str, float]:
         """Return places of joints and reactions by name; of a network that floats, the largest part of its reactions."""

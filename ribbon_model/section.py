@@ -27,6 +27,11 @@ from ribbon_model.laws import FLAT_ROD, OPEN_LAWS
 
 #: Natural strains: curvature about the width, curvature about the normal, twist.
 NATURAL = ("kappa_n", "kappa_2", "tau_n")
+#: Kinds of numbers that have the same name in every network; others are ratios (`ribbon_model.network_states.States`).
+KINDS = {
+    **dict.fromkeys(("weight", "pressure", "follower_pressure"), "force per length"), "field": "couple per length",
+    "foundation": "stiffness per length", **dict.fromkeys(NATURAL, "curvature"), "energy": "energy", "potential": "energy",
+}  # fmt: skip
 #: Relative dimensions of the section along the strip.
 DIMENSIONS = ("width", "thickness")
 #: A compliance about the normal of the laws with omega_2 = 0, to find a first state; 0 is the law.

@@ -1,7 +1,7 @@
 """Scenes of networks: strips as they are drawn, joints, what is held and what acts, and stages that are followed.
 
-A scene with ``strips`` is one. Numbers are in any unit of length and, for stiffnesses, a bending modulus
-(`ribbon_model.network`).
+A scene with ``strips`` is one. With ``dimensions`` (SI units) its numbers are in m, rad, N, N m and N/m; without, in any unit
+of length and, for stiffnesses, a bending modulus (`ribbon_model.network`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import functools
 import keyword
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -22,6 +22,7 @@ from branches.scene.fields import ConfigError, StepConfig, Strict
 from branches.scene.open_strip import (
     Along,
     Axis,
+    DimensionsConfig,
     EndWords,
     FollowConfig,
     OpenMesh,
@@ -29,14 +30,13 @@ from branches.scene.open_strip import (
     Phases,
     StagedScene,
     finite,
-    numbers_of,
 )
 from ribbon_model.changed_supports import replacing
 from ribbon_model.ends import DIRECTIONS, FREE_END, LOOSE, End
 from ribbon_model.equilibrium import directors
 from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, frame_along, straight
 from ribbon_model.network import FOLLOWER, POTENTIALS, Network, column
-from ribbon_model.section import Section, section_of
+from ribbon_model.section import Section
 
 #: An end of a strip, or a place along it, in words.
 _PLACE = re.compile(r"(\w+) (?:(start|finish)|at (0?\.\d+))")
@@ -47,8 +47,12 @@ _PLACES = "a strip and start, finish or a part of its length, as in 'beam start'
 def _vector(value: object) -> tuple[float, float, float]:
     if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
         raise ValueError(f"must be three numbers, not {value!r}")
-    x, y, z = value
-    return float(x), float(y), float(z)
+    return _over(value, 1.0)
+
+
+def _over(vector: Sequence[float], unit: float) -> tuple[float, float, float]:
+    x, y, z = vector
+    return x / unit, y / unit, z / unit
 
 
 Vector = Annotated[tuple[float, float, float], BeforeValidator(_vector)]
@@ -154,16 +158,16 @@ class NetworkScene(StagedScene):
 
     KIND: ClassVar[str] = "network"
     LISTS: ClassVar[tuple] = (
-        ("sections", "*", "*"), ("material", "*"), ("numbers", "*"), ("stages", "#", "to"), ("stages", "#", "numbers", "*"),
+        ("sections", "*", "*"), *((part, "*") for part in ("material", "dimensions", "numbers")),
+        ("stages", "#", "to"), ("stages", "#", "numbers", "*"),
     )  # fmt: skip
 
-    dimensions: ClassVar[None] = None
     SUPPORTS: ClassVar[str] = "held"
-    units: ClassVar[str] = "the units of the scene"
 
     title: str = ""
     material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
     sections: dict[str, dict[str, float | int | str]] = Field(default_factory=dict, description="several of these, by name")
+    dimensions: DimensionsConfig | None = Field(None, description="of the strips, whose unit in computations is their length")
     along: Along = Field(
         default_factory=dict, description="data along strips, with s from 0 to 1: expressions, or tables of [s, value]"
     )
@@ -211,6 +215,17 @@ class NetworkScene(StagedScene):
         return self
 
     # --- the network --------------------------------------------------------------------------------------------------
+
+    @property
+    def units(self) -> str:
+        return super().units if self.dimensions else "the units of the scene"
+
+    def kind(self, name: str) -> str:
+        return self._kinds.get(name, "")
+
+    @functools.cached_property
+    def _kinds(self) -> dict[str, str]:
+        return {name: kind for number in range(1, len(self.stages) + 1) for name, kind in self.strip(number).kinds.items()}
 
     def _held(self, stage: int) -> tuple[int | None, dict[str, End], tuple[str, ...]]:
         """Return the phase and what is held in a stage, and the joints at which that has changed since the first one."""
@@ -285,10 +300,10 @@ class NetworkScene(StagedScene):
                 del members[name]
                 members.update(zip(pieces[name], member.cut(parts)))
         for name, joint in self.joints.items():
-            axes = self.axes_at(name)
+            axes, arms = self.axes_at(name), {place: _over(arm, self.size("length")) for place, arm in joint.arm.items()}
             about, hinge = axes.get(joint.about, joint.about), axes.get(joint.hinge, joint.hinge or axes["width"])
             ends = [
-                JointEnd(piece, end, joint.angle.get(place, 0.0), about, joint.arm.get(place, (0.0, 0.0, 0.0)), goes_on)
+                JointEnd(piece, end, joint.angle.get(place, 0.0), about, arms.get(place, (0.0, 0.0, 0.0)), goes_on)
                 for place in joint.strips
                 for piece, end, goes_on in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
             ]
@@ -308,26 +323,23 @@ class NetworkScene(StagedScene):
         numbers = dict.fromkeys((name for name in (*POTENTIALS, FOLLOWER) if name in told), 0.0) | self.numbers
         where, first = self.directions, list(DIRECTIONS).index(self.magnetized)
         directions = where.weight, where.pressure, where.field, first
+        bare = Network(sections, members, joints, held, loads, {}, *directions)
         if changed:  # a support that is let go has no numbers
-            known = Network(sections, members, joints, held, loads, {}, *directions).known
-            numbers = {name: value for name, value in numbers.items() if name in known}
+            numbers = {name: value for name, value in numbers.items() if name in bare.known}
+        numbers = {name: value / self.size(bare.kinds.get(name, "")) for name, value in numbers.items()}
         return Network(sections, members, joints, held, loads, numbers, *directions, self.phases, where.foundation)
 
     def _sections(self) -> dict[str, Section]:
-        given = self.sections if self.material is None else {"strip": self.material}
-        found, names = {}, {name: "" if len(given) == 1 else f"_{name}" for name in given}
+        found, names = {}, {name: "" if len(self.given) == 1 else f"_{name}" for name in self.given}
         for name in self.along:
             if not name.endswith(tuple(names.values())):
                 raise ValueError(f"along: {name!r} must end in the name of a section, as in {name}{[*names.values()][0]}")
-        for name, values in given.items():
+        for name, values in self.given.items():
             where = "material" if self.material is not None else f"sections: {name}"
-            if "law" not in values:
-                raise ValueError(f"{where}: the field 'law' is missing")
-            law, numbers = str(values["law"]), {number: value for number, value in values.items() if number != "law"}
             try:
                 behind = names[name]
                 own = {each.removesuffix(behind): text for each, text in self.along.items() if each.endswith(behind)}
-                found[name] = section_of(law, numbers_of(where, numbers), own)
+                found[name] = self.section(where, values, own)
             except ValueError as error:
                 raise ValueError(str(error) if str(error).startswith(where) else f"{where}: {error}") from error
         return found
@@ -349,7 +361,10 @@ class NetworkScene(StagedScene):
                 found[name] = _member(section, strip, found)
             except ValueError as error:
                 raise ValueError(f"strips: {name}: {error}") from error
-        return found
+        return {
+            name: Member(one.section, one.length / L, _over(one.place, L), one.frame, _over(one.strains, 1 / L))
+            for L in [self.size("length")] for name, one in found.items()
+        }  # fmt: skip
 
     def _places(self) -> Iterator[tuple[str, str]]:
         """Yield all places along strips that are named, and where."""
@@ -372,9 +387,11 @@ class NetworkScene(StagedScene):
                         raise ValueError(f"loads: {number}: {place!r} is joined at {other}; give {other} in its place")
                 joints.setdefault(name, Joint([JointEnd(piece, end) for piece, end, _ in ends]))
             if action.force is not None:
-                (followers if action.follows else forces).append((name, action.force, action.arm))
+                (followers if action.follows else forces).append((name, action.force, _over(action.arm, self.size("length"))))
             else:
                 moments.append((name, action.moment))
+        if self.dimensions and moments and (forces or followers):
+            raise ValueError(f"loads: {number}: a force and a moment have no common unit; give each a load of its own")
         return Load(forces, moments, followers)
 
     @functools.cached_property

@@ -67,7 +67,7 @@ class OpenStage(Stage):
     def first(self) -> Point:
         """Return the state from which the first stage starts; raise ConfigError where there is none."""
         options = {"degree": self.scene.mesh.degree, "mesh": self.mesh_control(), "newton": newton_of(self.scene)}
-        point, self._how = self.scene.first({self.follow: self.stage.to}, options)
+        point, self._how = self.scene.first({self.follow: self.stage.to / self.scene.factor(self.follow)}, options)
         return point
 
     def restated(self, origin: Point, numbers: Mapping[str, float]) -> tuple[Collocation, np.ndarray]:
@@ -112,8 +112,9 @@ class OpenStage(Stage):
         units = " (numbers in units of L and B)" if self.scene.dimensions is not None else ""
         notes = [f"the first state was found {self._how}"] if self._how else []
         if self._how:
-            gaps = self.strip.gaps.items()
-            notes += [f"the drawing has a gap of {gap:.4g} at {name}, which was closed" for name, gap in gaps]
+            unit, metre = self.scene.size("length"), " m" if self.scene.dimensions else ""
+            gaps = [(name, f"{gap * unit:.4g}{metre}") for name, gap in self.strip.gaps.items()]
+            notes += [f"the drawing has a gap of {gap} at {name}, which was closed" for name, gap in gaps]
         notes = [f"stage {self.number}: {note}" for note in (*notes, *self.scene.told_axes(self.number))]
         if self.number == 1 and not self.problem.has_index:
             notes.append("loads that follow the strips have no energy: there is no index, and flutter is not looked for")

@@ -23,20 +23,24 @@ from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, Vector, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.plate import RIGIDITIES
-from ribbon_model.section import Section, section_of
+from ribbon_model.section import KINDS, Section, section_of
 
 #: Ends in one word or two.
 _WORDS: dict[str, dict] = {
     "clamped": {}, "hinged": {"rotation": HINGED, "about": "width"}, "ball joint": {"rotation": "free"},
     "free": {"rotation": "free", "place": "free"},
 }  # fmt: skip
-#: What a number is measured in: the power of the length, the power of the modulus B, and the name of the unit.
+#: What a kind of number is measured in: the power of the length, the power of the modulus B, and the name of the unit.
 _UNITS = {
-    **dict.fromkeys((*PLACE, "stroke", "roller"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
-    **dict.fromkeys(("force_width", "force_normal", "force_tangent"), (-2, 1, "N")), "moment": (-1, 1, "N m"),
-    "weight": (-3, 1, "N/m"), "foundation": (-4, 1, "N/m^2"), **dict.fromkeys(("kappa_n", "kappa_2", "tau_n"), (-1, 0, "1/m")),
-    **dict.fromkeys(("energy", "potential"), (-1, 1, "J")),
+    "length": (1, 0, "m"), "angle": (0, 0, "rad"), "force": (-2, 1, "N"), "moment": (-1, 1, "N m"), "energy": (-1, 1, "J"),
+    "force per length": (-3, 1, "N/m"), "couple per length": (-2, 1, "N"), "stiffness per length": (-4, 1, "N/m^2"),
+    "curvature": (-1, 0, "1/m"), "": (0, 0, ""),
 }  # fmt: skip
+#: Kinds of the numbers of open strips; others are ratios.
+_KINDS = KINDS | dict.fromkeys((*PLACE, "stroke", "roller"), "length") | dict.fromkeys(ANGLES, "angle") | {
+    f"{name}_{axis}": "moment" if name.endswith("M") else "force"
+    for name in ("force", "F", "M", "start_F", "start_M") for axis in DIRECTIONS
+} | {"moment": "moment", "F_roller": "force", "F_stroke": "force"}  # fmt: skip
 #: Powers of the length L and the modulus B, as axes write them.
 _NATURAL = {(1, 0): "L", (-1, 0): "1/L", (-1, 1): "B/L", (-2, 1): "B/L²", (-3, 1): "B/L³", (-4, 1): "B/L⁴"}
 #: Laws of a strip with dimensions; the first one if none is given.
@@ -271,6 +275,75 @@ class StagedScene(Scene):
         """The mechanics of all stages by what is held."""
         return {}
 
+    # --- units ----------------------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def kind(self, name: str) -> str:
+        """Return the kind of a number or column, from which its unit follows; '' for a ratio."""
+
+    def factor(self, name: str) -> float:
+        """Return what a number or column is multiplied by to have its unit."""
+        return self.size(self.kind(name))
+
+    def size(self, kind: str) -> float:
+        """Return the same for a kind of number."""
+        length, modulus, _ = _UNITS[kind]
+        return self.dimensions.length**length * self.modulus**modulus if self.dimensions else 1.0
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a number, '' without dimensions."""
+        return _UNITS[self.kind(name)][2] if self.dimensions is not None else ""
+
+    @property
+    def units(self) -> str:
+        """What lengths and moduli are measured in."""
+        sizes = self.dimensions
+        length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
+        modulus = "1" if sizes is None else f"1 ({self.modulus:.12g} N m^2)"
+        return f"bending modulus B = {modulus}, length L = {length}"
+
+    @property
+    def given(self) -> Mapping[str, Mapping[str, Any]]:
+        """The fields of all sections by name."""
+        return getattr(self, "sections", None) or {"strip": self.material}
+
+    @property
+    def _law(self) -> Any:
+        """The law of the first section with dimensions."""
+        return next(iter(self.given.values())).get("law", FINITE_WIDTH.name)
+
+    @property
+    def modulus(self) -> float:
+        """The bending modulus that is 1 in the law, in N m^2; 1 without dimensions."""
+        if self.dimensions is None:
+            return 1.0
+        narrow = 1 - self.dimensions.poisson_ratio**2 if self._law == FLAT_ROD.name else 1.0
+        return self.dimensions.modulus * narrow  # a narrow strip is free to bend across: E h^3 w/12
+
+    @property
+    def cautions(self) -> list[str]:
+        return unusual(self.dimensions.model_dump()) if self.dimensions else []
+
+    def section(self, where: str, fields: Mapping[str, Any], along: Mapping[str, str]) -> Section:
+        """Return the section of these fields, with the numbers that follow from dimensions; raise ValueError."""
+        values, d = dict(fields), self.dimensions
+        law = values.pop("law", d and FINITE_WIDTH.name)
+        if d is not None:
+            given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
+            if given:
+                raise ValueError(f"{where}: {given[0]} must not be given together with dimensions")
+            if law not in _OF_DIMENSIONS:
+                raise ValueError(f"{where}: law: {law!r} must be one of {', '.join(_OF_DIMENSIONS)} together with dimensions")
+            if law != self._law:
+                raise ValueError(f"{where}: law: {law!r} must be that of the first section, {self._law!r}, with dimensions")
+            values["nu"] = d.poisson_ratio
+            if law == FINITE_WIDTH.name:
+                values["Gamma"] = d.width**2 / (d.thickness * d.length)
+        if law is None:
+            raise ValueError(f"{where}: the field 'law' is missing")
+        numbers = numbers_of(where, values)
+        return section_of(str(law), {name: x / self.size(KINDS.get(name, "")) for name, x in numbers.items()}, along)
+
     def check_stages(self, columns: Sequence[str]) -> None:
         """Raise ValueError for a stage that names what is not there; ``columns`` are others than the numbers."""
         for number, stage in enumerate(self.stages, 1):
@@ -407,20 +480,8 @@ class OpenScene(StagedScene):
     BESIDE: ClassVar[str] = "F_tangent"
     SUPPORTS: ClassVar[str] = "start, finish"
 
-    def factor(self, name: str) -> float:
-        """Return what a number of the strip is multiplied by to have its unit."""
-        if self.dimensions is None:
-            return 1.0
-        length, modulus, _ = _unit_of(name)
-        return self.dimensions.length**length * self.modulus**modulus
-
-    @property
-    def units(self) -> str:
-        """What lengths and moduli are measured in."""
-        sizes = self.dimensions
-        length = "1" if sizes is None else f"1 ({exact_text(sizes.length)} m)"
-        modulus = "1" if sizes is None else f"1 ({self.modulus:.12g} N m^2)"
-        return f"bending modulus B = {modulus}, length L = {length}"
+    def kind(self, name: str) -> str:
+        return _KINDS.get(name, "")
 
     def replacing(self, stage: int) -> Sequence[str]:
         """Return the names of the loads that replace reactions in a stage."""
@@ -448,41 +509,10 @@ class OpenScene(StagedScene):
         except (ProblemError, ValueError) as error:
             raise ConfigError(f"begin: {self.begin}: {error}") from error
 
-    @property
-    def modulus(self) -> float:
-        """The bending modulus that is 1 in the law, in N m^2; 1 without dimensions."""
-        if self.dimensions is None:
-            return 1.0
-        narrow = 1 - self.dimensions.poisson_ratio**2 if self.material.get("law") == FLAT_ROD.name else 1.0
-        return self.dimensions.modulus * narrow  # a narrow strip is free to bend across: E h^3 w/12
-
-    def unit(self, name: str) -> str:
-        """Return the unit of a number, '' without dimensions."""
-        return _unit_of(name)[2] if self.dimensions is not None else ""
-
     def natural_unit(self, name: str) -> str:
         """Return what a number is divided by: powers of the length L and the bending modulus B; '' for ratios."""
-        length, modulus, unit = _unit_of(name)
+        length, modulus, unit = _UNITS[self.kind(name)]
         return _NATURAL[length, modulus] if length or modulus else unit
-
-    def _material(self) -> Section:
-        values = dict(self.material)
-        law = values.pop("law", None)
-        if self.dimensions is not None:
-            d = self.dimensions
-            given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
-            if given:
-                raise ValueError(f"material: {given[0]} must not be given together with dimensions")
-            law = FINITE_WIDTH.name if law is None else law
-            if law not in _OF_DIMENSIONS:
-                raise ValueError(f"material: law: {law!r} must be one of {', '.join(_OF_DIMENSIONS)} together with dimensions")
-            values["nu"] = d.poisson_ratio
-            if law == FINITE_WIDTH.name:
-                values["Gamma"] = d.width**2 / (d.thickness * d.length)
-        if law is None:
-            raise ValueError("material: the field 'law' is missing")
-        numbers = {name: value / self.factor(name) for name, value in numbers_of("material", values).items()}
-        return section_of(str(law), numbers, self.along)
 
     def _held(self, stage: int) -> tuple[EndConfig, EndConfig, bool]:
         """Return what is held in a stage, and whether that has changed since the first one."""
@@ -499,7 +529,8 @@ class OpenScene(StagedScene):
         from ribbon_model.open_strip import OpenStrip
 
         ends, where = (start.end(), finish.end()), self.directions
-        directions, material = (where.weight, where.foundation, where.stroke), self._material()
+        directions = where.weight, where.foundation, where.stroke
+        material = self.section("material", self.material, self.along)
         replacing = replacing_loads(ends[1])
         unknown = {"moment"} - set(replacing)
         more = (tuple(self.phases), Roller(self.roller.at, self.roller.held) if self.roller else None)
@@ -513,10 +544,6 @@ class OpenScene(StagedScene):
             if name in (STROKE, *LOADS) and name in known:
                 numbers.setdefault(name, 0.0)
         return OpenStrip(material, *ends, numbers, *directions, *more)
-
-    @property
-    def cautions(self) -> list[str]:
-        return unusual(self.dimensions.model_dump()) if self.dimensions else []
 
     @property
     def law_name(self) -> str:
@@ -572,7 +599,7 @@ def _in_si_units(part: str, numbers: object) -> Any:
 def _one_in_si_units(what: str, name: object, value: object) -> Any:
     if isinstance(value, list):
         return [_one_in_si_units(what, name, one) for one in value]
-    unit = _unit_of(name)[2] if isinstance(name, str) else ""
+    unit = _UNITS[_KINDS.get(name, "")][2] if isinstance(name, str) else ""
     if not isinstance(value, str) or unit not in UNITS:
         return value
     try:
@@ -583,12 +610,3 @@ def _one_in_si_units(what: str, name: object, value: object) -> Any:
 
 def _text(value: object) -> str:
     return exact_text(value) if type(value) in (int, float) else str(value)
-
-
-def _unit_of(name: str) -> tuple[int, int, str]:
-    if name in _UNITS:
-        return _UNITS[name]
-    base = name.removeprefix("start_")
-    if base.startswith("F_"):
-        return _UNITS["force_width"]
-    return _UNITS["moment"] if base.startswith("M_") else (0, 0, "")

@@ -110,7 +110,7 @@ class OpenBranch(StoredBranch):
     @property
     def length(self) -> float:
         """The length of the scene's dimensions; without them 1, or that of the longest strip."""
-        return self.scene.dimensions.length if self.scene.dimensions else self.scene.longest
+        return self.scene.size("length") * self.scene.longest
 
     @property
     def shape_length(self) -> float:
@@ -128,7 +128,7 @@ class OpenBranch(StoredBranch):
         It is that of the place where the width along the strip is 1.
         """
         if self.scene.dimensions:
-            return self.scene.dimensions.width / self.scene.dimensions.length * length
+            return self.scene.dimensions.width / self.length * length
         Gamma = self.scene.material.get("Gamma") if self.scene.KIND == OPEN else None
         return math.sqrt(Gamma * thickness * length) if Gamma and thickness else None
 
@@ -180,7 +180,7 @@ class OpenBranch(StoredBranch):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         parts = [part for strip in strips for part in parts_of(strip)]
         if asked is None:
-            asked = self.width_at(1.0, None) or OPEN_WIDTH * self.shape_length
+            asked = self.width_at(self.shape_length, None) or _WIDTH * self.shape_length
         return min([asked, *(ROOM * widest(part) for part in parts)])
 
     # --- places ---------------------------------------------------------------------------------------------------------
