@@ -277,7 +277,8 @@ class NetworkScene(StagedScene):
         try:
             return first_state(self.strip(), self.mesh.intervals, grows=grows, **options)
         except (ContinError, ValueError) as error:
-            raise ConfigError(f"strips: no first state was found from the drawing: {error}") from error
+            units = " (numbers in units of L and B)" if self.dimensions else ""
+            raise ConfigError(f"strips: no first state was found from the drawing: {error}{units}") from error
 
     def replacing(self, stage: int) -> tuple[str, ...]:
         """Return the names of the loads that replace reactions in a stage."""

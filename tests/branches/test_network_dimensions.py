@@ -105,3 +105,15 @@ def test_what_has_no_unit_is_one_sentence(fields, sentence):
     with pytest.raises(ConfigError) as raised:
         parse(text, "scene.yaml")
     assert sentence in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_message_says_what_its_numbers_are_in_and_dimensions_can_be_listed():
+    drawn = "strips: {s: {begin: [0, 0, 0], end: [0, 0, 0.3], normal: y}}\njoints: {A: [s start], T: [s finish]}\n"
+    text = (
+        f"material: {{}}\n{drawn}held: {{A: clamped, T: clamped}}\nnumbers: {{T_dz: 0.15}}\nstages: [{{follow: T_dy, to: 0}}]\n"
+    )
+    scene = parse(f"{text}dimensions: {{length: 0.3, {STEEL}}}", "scene.yaml")
+    with pytest.raises(ConfigError, match=r"held: A and T are 1.5 apart, .* \(numbers in units of L and B\)$"):
+        OpenStage(scene, 1).first()
+    steels = STEEL.replace("200GPa", "[100GPa, 200GPa]")
+    assert len(parse(f"{text}dimensions: {{length: 0.3, {steels}}}", "scene.yaml").scenes) == 2
