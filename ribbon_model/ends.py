@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from contin.lowlevel import levels
+from contin.lowlevel import levels, meant
 from ribbon_model.equilibrium import directors
 
 #: Directions by name, as unit vectors on the lab axes.
@@ -229,7 +229,9 @@ def check_known(numbers: Mapping[str, float], known: tuple[str, ...]) -> None:
     """Raise ValueError for a number that nothing uses."""
     for name in numbers:
         if name not in known:
-            raise ValueError(f"numbers: {name} is used by nothing here; there are {', '.join(known) or 'none'}")
+            raise ValueError(
+                f"numbers: {name}{meant(name, known)} is used by nothing here; there are {', '.join(known) or 'none'}"
+            )
 
 
 # --- a roller: a condition under an integral, as a phase ------------------------------------------------------------------

@@ -12,7 +12,7 @@ import numpy as np
 
 from branches.scene.columns import BOOK, FOUND, NUMBER, Change, Column, Columns, error_of
 from branches.scene.fields import ConfigError
-from branches.scene.labels import START, label_of, without_round_off
+from branches.scene.labels import START, begins, label_of, without_round_off
 from branches.scene.open_strip import StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from branches.scene.words import words_of
@@ -52,9 +52,10 @@ class OpenStage(Stage):
         self.free, self.watch = (self.follow, *self.problem.multipliers), SymmetriesWatch(scene.strip())
         felt = self.strip.conjugate(self.follow)
         self.conjugate = felt if felt in self.columns().all else "energy"
-        self._beside, self.units, unit = scene.BESIDE or self.conjugate, scene.units, scene.unit(self.follow)
+        beside, self.units, unit = scene.BESIDE or self.conjugate, scene.units, scene.unit(self.follow)
+        self._shown_in_rows = tuple(dict.fromkeys(("energy", beside)))
         self.title = f"stage {number}: {self.follow}{f' in {unit}' if unit else ''}\n"
-        self.head = f"{self.follow:>14s}     energy      {self._beside:>9s}      index   N  it"
+        self.head = f"{self.follow:>14s}{''.join(f'  {name:>12s}' for name in self._shown_in_rows)}  index   N  it"
         self._how = ""
         self._largest = abs(self.stage.to)
         self._missed: list[str] = []
@@ -292,10 +293,10 @@ class OpenStage(Stage):
         factor, told = self.scene.factor, {"energy": point["energy"], **point.functionals, **self.found(point)}
         stiffness = min(section.stiffness for section in self.strip.sections.values())  # what round-off is compared with
         self._largest = max(self._largest, abs(point[self.follow] * factor(self.follow)))
-        force, energy = (without_round_off(told[name], stiffness) * factor(name) for name in (self._beside, "energy"))
+        others = (without_round_off(told[name], stiffness) * factor(name) for name in self._shown_in_rows)
         value = without_round_off(point[self.follow] * factor(self.follow), self._largest)
         return (
-            f"{value:14.8g}  {energy:12.6g}  {force:12.6g}"
+            f"{value:14.8g}{''.join(f'  {other:12.6g}' for other in others)}"
             f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
         )
 
@@ -315,24 +316,40 @@ class OpenStage(Stage):
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
 
     def described(self, events: np.ndarray) -> list[str]:
-        """Return all labelled points in words, and the branch point at which the states of this stage stop being stable."""
-        own = [event for event in events if event["stage"] == self.number]
+        """Return all labelled points in words, up to where nothing moves, and the branch point beyond which it is unstable."""
+        lines, own = super().described(events), [event for event in events if event["stage"] == self.number]
+        lines += self._at_rest(own)
         names = [(event["label"].decode(), event["name"].decode()) for event in own]
+        later = [stage for number, stage in enumerate(self.scene.stages) if (stage.stage or number) == self.number]
         changes = [at for at, event in enumerate(own) if 0 in (event["index_before"], event["index_after"])]
         if not changes or own[at := changes[-1]]["index_after"] <= 0 or names[at][0] != Label.BRANCH_POINT:
-            return super().described(events)
-        used = [
-            stage.place_among(names) for number, stage in enumerate(self.scene.stages) if (stage.stage or number) == self.number
-        ]
-        if at in used:
-            return super().described(events)
+            return lines
+        if at in [stage.place_among(names) for stage in later]:
+            return lines
         tag = f"{names[at][0]} {sum(label == names[at][0] for label, name in names[: at + 1] if name != START)}"
         before = f"stage: {self.number} and " if self.number < len(self.scene.stages) else ""
         way = f"a stage with {before}start_at: {tag} follows the branch that leaves there"
         if own[at]["kernel"] != 1:
             way = "several modes are neutral there; a phase or an imperfection tells them apart"
         here = self._shown(self.follow, own[at][self.follow])
-        return [*super().described(events), f"stage {self.number}: unstable beyond {here} ({tag}): {way}"]
+        return [*lines, f"stage {self.number}: unstable beyond {here} ({tag}): {way}"]
+
+    def _at_rest(self, own: Sequence[np.void]) -> list[str]:
+        """Return up to where nothing moves, as straight strips: there energy and conjugate differ by their errors only."""
+        felt, last = self.strip.conjugate(self.follow), None
+        if not own or f"error_{felt}" not in own[0].dtype.names:
+            return []
+        for event in own:
+            bent, moved = event["energy"], event[felt] - own[0][felt]
+            if not (abs(bent) <= event["error_energy"] and abs(moved) <= 2 * event[f"error_{felt}"]):
+                break
+            last = event
+            if event["label"] == Label.BRANCH_POINT.encode() and not begins(event):
+                break
+        if last is None or begins(last):
+            return []
+        word = "before" if last["label"] == Label.BRANCH_POINT.encode() else "up to"
+        return [f"stage {self.number}: nothing moves {word} {self._shown(self.follow, last[self.follow])}"]
 
     def _with_error(self, event: np.void, column: str) -> str:
         """Return a column of a labelled point with its error, '' where it has none."""

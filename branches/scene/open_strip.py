@@ -605,7 +605,8 @@ def _one_in_si_units(what: str, name: object, value: object) -> Any:
     try:
         return quantity(value, unit)
     except ValueError as error:
-        raise ValueError(f"{what}: {error}") from error
+        near = "" if name in _UNITS else meant(str(name), _UNITS)
+        raise ValueError(f"{what}: {error}{near and f'; {name!r}{near} has no unit'}") from error
 
 
 def _text(value: object) -> str:

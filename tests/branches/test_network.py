@@ -20,6 +20,7 @@ from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.network import column
+from branches.scene.open_stage import OpenStage
 from branches.scene.parse import dump, load, parse
 from contin import ContinError, trace
 from ribbon_model.descent import past
@@ -503,6 +504,14 @@ def test_rollers_that_come_and_go(run):
 
 
 @pytest.mark.full
+def test_a_table_has_a_column_once():
+    text = "material: {law: flat rod, nu: 0.3}\nstrips: {one: {begin: [0, 0, 0], end: [0, 1, 0]}}\n"
+    text += "joints: {A: [one start], B: [one finish]}\nheld: {A: clamped}\nloads: {P: {B: [0, -1, 0]}}\n"
+    scene = parse(text + "stages: [{follow: P, to: 1}, {follow: kappa_n, to: 1}]\n", "scene")
+    heads = [OpenStage(scene, number).head.split()[:-4] for number in (1, 2)]
+    assert heads[0][:2] == ["P", "energy"] and heads[1] == ["kappa_n", "energy"]
+
+
 def test_reactions_that_no_load_replaces_are_told(tmp_path):
     """A moment at a clamp that becomes a ball joint: no dead moment has an energy there."""
     text = CANTILEVER.replace("tip: [0, 0, -1]", "tip: [0, 1, 0]")

@@ -28,6 +28,10 @@ from branches.store.files import StoreError
 from branches.store.open_branch import OpenBranch
 
 TIP = "material: {law: flat rod, nu: 0.3}\nfinish: free\nstages: [{follow: force_width, to: -6}]\n"
+SIZES = (
+    "material: {}\nbegin: arch\nroller: {at: 0.5}\nnumbers: {distance: 0.39}\n"
+    "dimensions: {width: 10mm, thickness: 0.5mm, length: 0.4, poisson_ratio: 0.3, youngs_modulus: 200GPa}\n"
+)
 #: Scenes with one mistake, and a part of the sentence.
 MISTAKES = {
     "stages: []": "the field 'material' is missing",
@@ -54,6 +58,8 @@ MISTAKES = {
     TIP.replace("0.3", "[0.2, 0.3]").replace("to: -6", "too: -6"): "unknown field 'stages.0.too' (did you",
     TIP + "closed: {half_twists: 1}\n": "closed: must not be given together with start or finish",
     TIP + "numbers: {distance: 1}\n": "numbers: distance is used by nothing here",
+    TIP + "numbers: {weigth: 1}\n": "numbers: weigth (did you mean 'weight'?) is used by nothing here",
+    SIZES + "stages: [{follow: rollr, to: -20mm}]\n": "'-20mm' must be a number; 'rollr' (did you mean 'roller'?) has no unit",
     TIP + "along: {kappa_n: 'exp(x)'}\n": "along: kappa_n: 'exp(x)': 'x' is not allowed",
     TIP + "along: {kappa_n: [[0, 1]]}\n": "a table must have 2 to 12 points",
     TIP + "along: {kappa_n: [[0, 1], [0.5, 2]]}\n": "the places s of a table must increase from 0 to 1",
@@ -87,7 +93,9 @@ def test_a_run_says_where_stability_ended_and_how_to_go_on(tmp_path, capsys):
     for more in ("", ", {follow: force_width, to: -5.1, start_at: BP 1}"):
         scene = parse(TIP.replace("}]", "}" + more + "]"), "scene")
         assert run_scene(scene, tmp_path / f"{bool(more)}.h5", Display(quiet=True)) == "complete"
-        said.append([line.strip() for line in capsys.readouterr().out.splitlines() if "unstable" in line])
+        out = capsys.readouterr().out
+        said.append([line.strip() for line in out.splitlines() if "unstable" in line])
+        assert "  stage 1: nothing moves before force_width = -4.977016946\n" in out and out.count("nothing moves") == 1
     assert said[1] == [] and len(said[0]) == 1
     words = r"stage 1: unstable beyond force_width = (\S+) \(BP 1\): a stage with start_at: BP 1 follows .*"
     found = re.fullmatch(words, said[0][0])
