@@ -84,6 +84,7 @@ def _run(options) -> int:
             return _run_many(scene, options)
         path = output_path(options)
         scene = _with_stability(scene, path)
+        interrupt.change(f"nothing new is in {path}; the same command starts again")
     except (ConfigError, StoreError) as error:
         return _refuse(error)
     from branches.run.display import StartingDisplay
@@ -99,6 +100,7 @@ def _run(options) -> int:
         return _refuse(error)
     from branches.scene.stages import stages_of
 
+    interrupt.change(f"{path} is {outcome}")
     if outcome == "complete" and stages_of(scene)[0].has_barriers:
         _tell_barriers(path, display, options.quiet)
     if outcome == "complete" and options.search is not None:

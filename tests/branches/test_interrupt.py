@@ -77,6 +77,16 @@ def test_ctrl_c(command, primary, name, moment):
     assert not list(folder.rglob("*.part"))
 
 
+@pytest.mark.posix("Windows sends Ctrl-C in another way")
+def test_ctrl_c_before_the_first_point_says_what_is_kept(command, root):
+    arguments = [str(root / "configs" / "network_hexagram.yaml"), "--out", "star.h5"]
+    process = command.start(*arguments, program=("-X", "importtime", "-m", "branches.run"))
+    said = interrupted(process, "ribbon_model.network_first", 0.02)
+    assert process.returncode == 130
+    assert said == ["interrupted; nothing new is in star.h5; the same command starts again"]
+    assert not (command.folder / "star.h5").exists()
+
+
 @pytest.fixture
 def pressed(monkeypatch):
     """A function that presses Ctrl-C; ``left`` lists what would have ended the process."""
