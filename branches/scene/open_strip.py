@@ -605,7 +605,7 @@ def _one_in_si_units(what: str, name: object, value: object) -> Any:
     try:
         return quantity(value, unit)
     except ValueError as error:
-        near = "" if name in _UNITS else meant(str(name), _UNITS)
+        near = "" if name in _KINDS else meant(str(name), _KINDS)
         raise ValueError(f"{what}: {error}{near and f'; {name!r}{near} has no unit'}") from error
 
 

@@ -180,7 +180,7 @@ class OpenBranch(StoredBranch):
     def drawn_width(self, strips: list[Shape], asked: float | None) -> float:
         parts = [part for strip in strips for part in parts_of(strip)]
         if asked is None:
-            asked = self.width_at(self.shape_length, None) or _WIDTH * self.shape_length
+            asked = self.width_at(self.shape_length, None) or OPEN_WIDTH * self.shape_length
         return min([asked, *(ROOM * widest(part) for part in parts)])
 
     # --- places ---------------------------------------------------------------------------------------------------------
