@@ -400,7 +400,7 @@ def test_what_is_drawn_without_stress_is_not_assembled():
             {"held": {}, "loads": {"P": Load([("K", AXIS, AXIS)])}},
             "loads: P: nothing is held, so its forces must add up to zero",
         ),
-        ({"numbers": {"wieght": 1.0}}, "numbers: wieght is used by nothing here"),
+        ({"numbers": {"wieght": 1.0}}, "numbers: wieght (did you mean 'weight'?) is used by nothing here"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(changes, message):

@@ -129,7 +129,7 @@ def test_what_nothing_determines_is_rejected(what, request):
         (lambda: End(held=(WIDTH, WIDTH)), "repeat each other"),
         (lambda: End(held=((0, 0, 0),)), "must be three numbers"),
         (lambda: End("glued"), "rotation: 'glued' must be"),
-        (lambda: OpenStrip(ROD, numbers={"weigth": 1.0}), "weigth is used by nothing here"),
+        (lambda: OpenStrip(ROD, numbers={"weigth": 1.0}), "weigth (did you mean 'weight'?) is used by nothing here"),
         (lambda: OpenStrip(ROD, numbers={"force_tangent": 1.0}), "force_tangent is used by nothing here"),
         (lambda: OpenStrip(ROD, numbers={"moment": 1.0}), "moment needs a hinge"),
         (lambda: OpenStrip(ROD, numbers={"weight": math.inf}), "weight = inf must be finite"),
