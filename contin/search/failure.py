@@ -36,7 +36,7 @@ from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
 from contin.functions.origin import Place, jump, not_finite
 from contin.functions.signature import Signature, named_values
-from contin.levels import APART, CERTAIN, CORRECTED, DEPENDENT, LAST_PLACES, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH, TINY
+from contin.levels import APART, CERTAIN, CORRECTED, DEPENDENT, LAST_PLACES, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.border import Bordered, cosine, random_rows
 from contin.problems.rewriting import returning
 
@@ -44,8 +44,6 @@ from contin.problems.rewriting import returning
 _MOST = 8
 #: Updates shrink by a factor between these where F_x is singular at the solution: by 1/2 at a fold, by 2/3 at a pitchfork.
 _FACTORS = (0.3, 0.9)
-#: Sizes of equations are told by how they change along so many random directions.
-_WAYS = 3
 #: Points on the way from a guess through corners.
 _MOST_OF_WAY = 300
 #: Largest difference of two such factors, one after the other: with more, their series is not a geometric one yet.
@@ -295,8 +293,6 @@ def _rank(system: System, x: Array) -> _Rank | None:
         return None
     count = min(len(system.problem.states) + len(system.free) + 1, _MOST, system.size)
     columns, rows = (np.hstack([random_rows(count, system.size), np.zeros((count, k))]) for k in (0, count))
-    along = [system.along(x, [way]) for way in random_rows(_WAYS, system.size)]
-    columns *= np.maximum(np.abs(along).max(axis=0), TINY)  # as large as the equations
     found = Bordered(system.linearize(x, rows, columns)[1], (system.size, system.size), count, count)
     if not (np.isfinite(found.solutions).all() and np.isfinite(found.transposed).all()):
         return None
