@@ -10,8 +10,8 @@ that are zero, or nothing but errors, follow from the exact Taylor expansion of 
 3. The eigenvector v of mu leads to the branch that leaves there. The amplitude at which a nonlinear term along v is as large as
    the linear one is the size of the states that take part in v.
 
-Where the branch is flat in p, as at the top of a circle, its bend bounds the size of p: a term of higher order that is as large
-as the value of a state.
+Where the branch is flat in p, as at the top of a circle, its bend alone bounds the size of p: a term of higher order that is as
+large as a state whose small value is more than nothing, since F_x would be singular not much further than that away.
 
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.folds import on_finer_mesh
 from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
+from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
 #: Iterations of the power method, and largest Krylov space that parts close eigenvalues. Sizes are powers of two: the distance
@@ -95,11 +96,15 @@ def scaled(
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order."""
+    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order.
+
+    It is ``pure`` if no more than a part `APART` of any state is left in it of other eigenvectors.
+    """
 
     vector: Array
     rate: float
     order: int
+    pure: bool
 
     @property
     def distance(self) -> float:
@@ -138,11 +143,10 @@ class _FirstPoint:
         """Return whether all sizes are of order one, as changes of F along a random vector show: they are not looked for then.
 
         For changes of 0.01 in all unknowns, F is nearly linear. For changes of 1, each ``unknown`` that does not change along
-        the branch changes by terms that are not linear, or not at all; for a change of 1000 of a state of its own, most of
-        that is not linear in it.
+        the branch changes by terms that are not linear; for a change of 1000 of its own, most of that is not linear in it.
         """
-        largest, at_rest, rates = self.system.largest, self.system.residual(self.x), self.system.largest(self.linear.tangent)
-        still = unknown & (rates < USUAL[0])
+        largest, at_rest = self.system.largest, self.system.residual(self.x)
+        still = unknown & (largest(self.linear.tangent) < USUAL[0])
         moved = draws.signs(self._random, largest(self.x)) * self._random.uniform(0.5, 1, unknown.size)
         missed = []
         for sizes in (USUAL[0], 1.0, np.where(still, USUAL[1], 1.0)):
@@ -153,10 +157,9 @@ class _FirstPoint:
                 return False
             missed.append(self._factors.solve(np.append(values, self.row @ change)) - change)
         near, here, far = missed
-        follows, straight = largest(here) >= USUAL[0], largest(far - USUAL[1] * here) < USUAL[1] / 2 * largest(here)
-        straight[len(self.system.problem.states) :] = False  # parameters may enter linearly
-        still &= largest(here) + rates > CORRECTED
-        return bool(follows.any() and np.all(largest(near) <= USUAL[0]) and not np.any(still & (straight | ~follows)))
+        bent = largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)
+        follows = largest(here) >= USUAL[0]
+        return bool(follows.any() and np.all(largest(near) <= USUAL[0]) and np.all(follows & bent | ~still))
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:
@@ -174,12 +177,13 @@ class _FirstPoint:
         terms = [self.system.largest(term) for term in self._terms()]
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
-        others = np.where(at, 0.0, known)
-        reach = min(_held(reach, terms[0], others), _bent(terms, others))
+        small = (known > 0) & (known < USUAL[0]) & ~at
+        bends = np.where(at | (small & ~(known > DOUBLED * self._alone(small))), 0.0, known)
+        reach = min(_held(reach, terms[0], np.where(at, 0.0, known)), _bent(terms, bends))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
-        branches = [self._branch(mode) for mode in modes if mode.vector.any()]
+        branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
         branches = [(parts, size) for parts, size in branches if np.any(parts)]  # some are nothing but what changes
         held = [_held(size, parts[0], known) for parts, size in branches]
         for (parts, _), size in zip(branches, held):
@@ -189,7 +193,13 @@ class _FirstPoint:
             if not np.isfinite(size):
                 sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
                 natural = _larger(natural, sizes, natural == 0, error)
-        return np.where(_counts(known, natural) | (stated > 0), known, natural)
+        found = np.where(_counts(known, natural) | (stated > 0), known, natural)
+        small = (found > 0) & (found < USUAL[0]) & (stated == 0) & ~at
+        apart = self._apart(small)
+        found = np.where(small & ~_counts(found, apart), apart, found)
+        guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
+        nothing = found < CORRECTED * np.max(found[guessed], initial=0.0)
+        return np.where(guessed & nothing, 0.0, found)
 
     def _beside(self, number: int) -> tuple[Array, Any, float]:
         """Return a point that differs by one unit in the last place, with factors there, and a factor between one and two.
@@ -256,6 +266,20 @@ class _FirstPoint:
                 return
             left = left & ~part
 
+    def _apart(self, which: Pattern) -> Array:
+        """The same up to one, and 0 where that never happens: states that enter linearly go as far as 1e12."""
+        found = self._alone(which)
+        return np.where(np.isfinite(found), np.minimum(found, 1.0), 0.0)
+
+    def _alone(self, which: Pattern) -> Array:
+        """Return how far states can change by themselves before F_x is singular; infinity where that never happens."""
+        found = np.full(which.size, np.inf)
+        for number in np.flatnonzero(which) if np.count_nonzero(which) <= MANY else ():
+            alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
+            mode = self._nearest(alone, np.ones_like(which))
+            found[number] = np.inf if mode is None else mode.distance
+        return found
+
     def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
         """Return the nearest singular point in a direction and the null vector there, of some states; None where there is none.
 
@@ -302,7 +326,8 @@ class _FirstPoint:
         errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
         found = self._kept(mode, self.system.largest(mode) > errors)
         alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
-        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order)
+        pure = bool(np.all(self.system.largest(missed) <= APART * self.system.largest(mode)))
+        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order, pure)
 
     def _parted(self, v: Array, direction: Array, order: int) -> tuple[Array, float] | None:
         """Return the eigenvector of the largest eigenvalue in the Krylov space of v, and that; None where it is complex."""
@@ -324,6 +349,20 @@ class _FirstPoint:
         if values[largest].imag != 0 or values[largest] == 0:
             return None
         return vectors[:, largest].real @ np.array(basis[:count]), float(values[largest].real)
+
+    def _settled_branch(self, mode: _Mode) -> tuple[list[Array], float]:
+        """Return what `_branch` does, without states that change with the next iterations of the null vector.
+
+        They belong to what the power method has left of other eigenvectors, where symmetry makes them zero.
+        """
+        if mode.pure:
+            return self._branch(mode)
+        again = mode.vector
+        for _ in range(2):  # the sign is that of the first again
+            again = self._changed(again, self.tangent, mode.order) / mode.rate
+        parts, size = self._branch(mode)
+        pairs = zip(parts, (largest for largest, _ in self._terms_along(replace(mode, vector=again))))
+        return [np.where(np.abs(part - other) < _LASTS * part, part, 0.0) for part, other in pairs], size
 
     def _branch(self, mode: _Mode) -> tuple[list[Array], float]:
         """Return the terms of the branch that leaves along a null vector v, and the size of a, both described below.
@@ -405,7 +444,7 @@ class _FirstPoint:
         return draws.rounded(self._random, v)
 
     def _kept(self, v: Array, kept: Pattern | Array) -> Array:
-        """Return a vector with zeros in all states and parameters that are not kept; or times numbers by name."""
+        """Return a vector with zeros in all states and parameters that are not kept."""
         count = len(self.system.problem.states)
         return v * np.concatenate([np.tile(kept[:count], self.system.state_size // count), kept[count:]])
 
