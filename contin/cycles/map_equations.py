@@ -17,7 +17,6 @@ from contin.events.arc import SpecialPoint
 from contin.events.dips import NO_MULTIPLIER
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.functions.batch import Batch
-from contin.functions.origin import source
 from contin.levels import DOUBLED
 from contin.linalg.blocks import MANY
 from contin.linalg.periodic import log_eigenvalues
@@ -152,22 +151,6 @@ class MapSystem(OfCycles, Algebraic):
     def conditions(self) -> int:  # type: ignore[override]
         """Their number, at all points."""
         return self.rounds * len(self.problem.batch("map").conditions(self._free)) if type(self) is MapSystem else 0
-
-    def written(self, k: int) -> str:
-        """Return what the user has written for a condition, and at which point."""
-        batch = self.problem.batch("map")
-        origins = batch.conditions(self._free)
-        point = f" at point {k // len(origins) + 1}" if self.rounds > 1 else ""
-        return source(batch, origins[k % len(origins)]) + point
-
-    def numbers(self, x: Array) -> tuple[Array, Array]:
-        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
-        values, slopes = self._deciding.jacobian(*self._terms[0].inputs(x), self._deciding.columns(self._free))
-        found = np.zeros((*values.shape, self.size))
-        found[..., self.state_size :] = slopes[:, :, self._n :]
-        for at, each in enumerate(slopes):
-            found[at, :, at * self._n : (at + 1) * self._n] = each[:, : self._n]
-        return values.ravel(), found.reshape(-1, self.size)
 
     def _by_x(self, slopes: Array) -> Array:
         first, last = slopes[:, : self._n].ravel(), np.add.reduce(slopes[:, self._n :])

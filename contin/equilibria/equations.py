@@ -235,6 +235,8 @@ class Algebraic(Spectral, Composed):
         return self._terms[0].values(x)
 
     _functions = ("residual",)
+    #: Points at which the functions are evaluated.
+    rounds: int = 1
 
     @functools.cached_property
     def _terms(self) -> tuple[Term]:
@@ -278,9 +280,10 @@ class Algebraic(Spectral, Composed):
         return len(self.problem.batch("residual").conditions(self._free)) if taken else 0
 
     def written(self, k: int) -> str:
-        """Return what the user has written for a condition."""
-        batch = self.problem.batch("residual")
-        return source(batch, batch.conditions(self._free)[k])
+        """Return what the user has written for a condition and, where there are several points, at which it is."""
+        batch = self.problem.batch(self._functions[0])
+        point, origin = divmod(k, len(origins := batch.conditions(self._free)))
+        return source(batch, origins[origin]) + (f" at point {point + 1}" if self.rounds > 1 else "")
 
     def with_sides(self, sides: Array) -> Algebraic:
         """Return the same with frozen outcomes; with none, the equations as they are."""
@@ -296,7 +299,11 @@ class Algebraic(Spectral, Composed):
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
         values, slopes = self._deciding.jacobian(*self._terms[0].inputs(x), self._deciding.columns(self._free))
-        return values[0], slopes[0]
+        found, n = np.zeros((*values.shape, self.size)), self.state_size // self.rounds
+        found[..., self.state_size :] = slopes[:, :, n:]
+        for at, each in enumerate(slopes):
+            found[at, :, at * n : (at + 1) * n] = each[:, :n]
+        return values.ravel(), found.reshape(-1, self.size)
 
     @functools.cached_property
     def _deciding(self) -> Batch:
