@@ -52,7 +52,7 @@ def main(argv=None) -> int:
     if not words or words[0] not in (*COMMANDS, "scenes"):
         problem, known = "a command is needed", (*COMMANDS, "scenes")
         if words:
-            from branches.scene.meant import meant
+            from contin.lowlevel import meant
 
             problem = f"there is no command {words[0]!r}{meant(words[0], known)}"
         sys.stderr.write(f"error: {problem}; the commands are {', '.join(known)} (--help describes them)\n")

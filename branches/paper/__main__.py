@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     survive_any_encoding()
     unknown = [name for name in options.items if name not in ITEMS]
     if unknown:
-        from branches.scene.meant import meant
+        from contin.lowlevel import meant
 
         near = [f"{name!r}{meant(name, ITEMS)}" for name in unknown]
         complain(f"error: there is no item {', '.join(near)}; known are {', '.join(ITEMS)}")

@@ -8,9 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from branches.scene.fields import Interval, MeshConfig, Scene, StepConfig, Strict, missing, show, unknown
-from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, quantity, unusual
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, meant
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, Law
 
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]

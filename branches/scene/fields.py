@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from branches.scene.meant import meant
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, meant
 
 
 class ConfigError(Exception):

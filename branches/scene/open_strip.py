@@ -17,9 +17,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import ConfigError, Interval, MeshConfig, Scene, StepConfig, Strict, show
-from branches.scene.meant import meant
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
-from contin.lowlevel import exact_text
+from contin.lowlevel import exact_text, meant
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, Vector, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.plate import RIGIDITIES

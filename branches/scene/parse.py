@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from branches.scene.closed import ClosedScene
 from branches.scene.fields import ConfigError, Scene, missing, plain, show, unknown
-from branches.scene.meant import meant
+from contin.lowlevel import meant
 
 if TYPE_CHECKING:
     from branches.scene.sweep import Sweep

@@ -18,10 +18,10 @@ from branches.draw.style import smooth
 from branches.scene.columns import Columns
 from branches.scene.fields import Scene
 from branches.scene.labels import SPECIAL, Label, begins, label_of
-from branches.scene.meant import meant
 from branches.scene.parse import dump
 from branches.scene.stages import stages_of
 from branches.store.files import StoreError
+from contin.lowlevel import meant
 
 if TYPE_CHECKING:
     from branches.scene.stage import Stage

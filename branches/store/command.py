@@ -34,7 +34,7 @@ class Parser(argparse.ArgumentParser):
             if word == "--":
                 break
             if name.startswith("--") and name not in self._option_string_actions:
-                from branches.scene.meant import meant
+                from contin.lowlevel import meant
 
                 self.error(f"there is no option {name}{meant(name, self._option_string_actions)}")
         options, rest = self.parse_known_args(args, namespace)

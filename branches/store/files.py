@@ -13,10 +13,9 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from branches.scene.meant import meant
 from branches.store import interrupt
 from branches.store.command import typed
-from contin.lowlevel import temporary_name, write_whole
+from contin.lowlevel import meant, temporary_name, write_whole
 
 #: Bytes of the smallest result; as many are written to test the disk before a computation.
 _SMALLEST = 64 * 1024

@@ -109,7 +109,7 @@ class Lane(ABC):
         self._attempt = rules.attempt_of(system.size)
         held = [test for test in tests if test.holds_one_of(system.free)]
         sides = [(1.0 if test.value == settings.limits[test.column][1] else -1.0) if test.limit else 0.0 for test in held]
-        self._watch = rules.Watch(
+        self._watch = rules.Watched(
             int(settings.branch_points), int(any(self.knows(test) for test in tests)), int(noisy),
             np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
             np.array([test.value for test in held], dtype=float), np.array(sides), *self._home(),

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from contin.continuation import rules
-from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
+from contin.continuation.rules import Attempt, Control, Frame, Path, Watched
 from contin.core import small
 from contin.core.small import Equations, Linear
 from contin.core.system import USUAL
@@ -42,7 +42,7 @@ class Rooms(NamedTuple):
     frame: Frame
     attempt: Attempt
     control: Control
-    watch: Watch
+    watch: Watched
     quotient: Quotient
     spectra: Spectra
 

@@ -15,7 +15,7 @@ from contin.collocation.newton import Mesh, Workspace
 from contin.collocation.round import DRIFTED, KNOWN, Monodromy, fill_multipliers, nearest_to_one
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
-from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
+from contin.continuation.rules import Attempt, Control, Frame, Path, Watched
 from contin.core.newton import STAGNANT
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import COLLAPSED
@@ -61,7 +61,7 @@ class MeshRooms(NamedTuple):
     frame: Frame
     attempt: Attempt
     control: Control
-    watch: Watch
+    watch: Watched
 
 
 @kernel(reorder=False, last=True)

@@ -1,7 +1,7 @@
 """The rules of one step: predicted, judged, watched, accepted, whatever the equations are.
 
 They are one text. Kernels call them, where points stand one by one in a `Path`; a step that Python makes is row 2 of a path of
-its own, whose row 1 is the state (`predict`, `judged`, `following`).
+its own, whose row 1 is the state (`length_of`, `predict`, `judged`).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Attempt(NamedTuple):
     judged: Vector
 
 
-class Watch(NamedTuple):
+class Watched(NamedTuple):
     """What both ends of a step are compared in.
 
     ``branch_points``, ``eigenvalues`` are 1 where these are watched, and ``noisy`` where round-off of Newton's method was
@@ -308,7 +308,7 @@ def first_length(frame: Frame, control: Control, path: Path, number: int) -> flo
 
 @helper
 def asks(
-    frame: Frame, attempt: Attempt, control: Control, watch: Watch, path: Path, accepted: int, number: int, step: float
+    frame: Frame, attempt: Attempt, control: Control, watch: Watched, path: Path, accepted: int, number: int, step: float
 ) -> bool:
     """Return whether an entry of the watch list asks for a closer look: all but those of branch points and eigenvalues.
 

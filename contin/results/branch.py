@@ -108,8 +108,8 @@ class Branch:
         """
         found = [point for point in self.points if point.label == label]
         if not found and label not in (known := [each.value for each in Label if each]):
-            known_labels = ", ".join(known)
-            warn(f"labelled: no point has the label {label!r}{meant(label, known)}; contin's are {known_labels}", UserWarning)
+            near = meant(label, known)
+            warn(f"labelled: no point has the label {label!r}{near}; contin's are {', '.join(known)}", UserWarning)
         return found if label == Label.END else [point for point in found if point.arclength]
 
     def to_pandas(self) -> Any:
