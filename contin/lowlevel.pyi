@@ -16,6 +16,7 @@ from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.iteration import gradient, least, minimum, root
 from .kernels.machine_code import cache_directory
+from .linalg.forms import condense_forms
 from .linalg.orientation import eigenbasis
 from .results.marks import PALETTE, Colour
 from .results.phase_response import PhaseResponse
@@ -30,7 +31,7 @@ from .text import exact_text, meant, shown
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",
     "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
-    "cache_directory", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient", "hermite",
-    "interpolation", "least", "levels", "locate_branch_point", "meant", "minimum", "oscillation", "point_of", "read_branches",
-    "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
+    "cache_directory", "condense_forms", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient",
+    "hermite", "interpolation", "least", "levels", "locate_branch_point", "meant", "minimum", "oscillation", "point_of",
+    "read_branches", "read_columns", "root", "shown", "temporary_name", "through", "write_whole",
 ]  # fmt: skip

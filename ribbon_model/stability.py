@@ -13,7 +13,7 @@ to 12 ms.
 Steps:
 
 1. `_of_mesh`: Q on the functions v of one interval of the mesh, (k d, k d) for k functions v.
-2. `_condensed`: 6 combinations y of their values give the increment of E over the interval. The others couple to nothing
+2. `condense_forms`: 6 combinations y of their values give the increment of E over the interval. The others couple to nothing
    outside it, and are eliminated (Schur complement). Then two neighbours are one interval with 12 unknowns, of which 6 are
    eliminated, and so on, as long as what is eliminated is positive definite: then no negative direction is lost (Haynsworth).
 3. `_Form`: the piece of the loop that the symmetry repeats. With S_e (6, 6) of an interval, its increment W_e y_e (6,), and E
@@ -32,18 +32,21 @@ Steps:
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, levels
-from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
+from contin.lowlevel import basis, condense_forms, levels
+from ribbon_model.second_variation import Equilibrium, Symmetry, coupling, cross_matrix
 
-#: The form that is eliminated is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is. Ten times
-#: smaller, Schur complements could be large, and lose digits.
+#: The form that is eliminated is the identity plus O(h^2). Where a pivot of it is below this, nothing is. Ten times smaller,
+#: Schur complements could be large, and lose digits.
 _DEFINITE = 0.2
 #: Rigid motions, and components of E.
 _RIGID = 6
+#: Matrices (3, 3) of the products with the axes: a x for a = sum of a_i e_i is their sum.
+_CROSS = np.array([cross_matrix(axis) for axis in np.eye(3)])
 
 
 @dataclass(frozen=True)
@@ -182,8 +185,9 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     origin, gap = _origin(equilibrium.symmetry, ends[-1])
     x = (inside + origin).reshape(-1, 3)
     d = d.reshape(-1, 3, 3)
-    momentum = equilibrium.moment + np.cross(origin, equilibrium.force)
-    moment = np.einsum("kij,kj->ki", d, momentum - np.cross(x, equilibrium.force))
+    about = cross_matrix(equilibrium.force)
+    momentum = equilibrium.moment - about @ origin
+    moment = np.einsum("kij,kj->ki", d, momentum + x @ about.T)
     strain, compliance = equilibrium.response(moment)
     free = equilibrium.law.free
     try:
@@ -191,8 +195,8 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     except np.linalg.LinAlgError as error:
         raise ValueError("the energy is not convex in the strains along this equilibrium: it has no index") from error
     u = d[:, free].transpose(0, 2, 1) @ factor
-    generator = np.concatenate([u, np.cross(u, x[:, :, None], axis=1)], axis=1)
-    rate = np.cross(moment, strain) + np.cross(d @ equilibrium.force, [0.0, 0.0, 1.0])  # M'
+    generator = np.concatenate([u, -np.tensordot(x, _CROSS, 1) @ u], axis=1)
+    rate = (np.tensordot(moment, _CROSS, 1) @ strain[:, :, None])[:, :, 0] + d @ equilibrium.force @ _CROSS[2]  # M'
     motion = np.einsum("kab,ka->kb", factor, rate[:, free])
     shape = stations.shape
     return _Points(lengths, generator.reshape(*shape, 6, -1), motion.reshape(*shape, -1), momentum, gap)
@@ -257,94 +261,39 @@ def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
     phases = _phases(symmetry)
     circular = _CIRCULAR @ matrix @ _CIRCULAR.conj().T
     circular[(phases[:, None] - phases) % symmetry.order != 0] = 0
-    matrix = (_CIRCULAR.conj().T @ circular @ _CIRCULAR).real
+    matrix = (_CIRCULAR.conj().T @ circular @ _CIRCULAR).real.copy()
     return (matrix - _reversal(symmetry) @ matrix @ _reversal(symmetry)) / 2 if symmetry.reverses else matrix
 
 
 # --- the form -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Intervals:
-    """Q on neighbouring intervals of the piece, as many unknowns K on each.
+def _of_mesh(points: _Points, coupling, degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return Q on each interval of the mesh (N, m, m), increments (N, 6, m), the shift of phase (N, m), and unknowns in use.
 
-    Attributes
-    ----------
-    local : ndarray, shape (N, K, K)
-        Q on the perturbations of one interval.
-    increments : ndarray, shape (N, 6, K)
-        The increment of E over it.
-    motion : ndarray, shape (N, K)
-        The shift of phase.
+    Unknowns are v at the Gauss points times the roots of their weights. Q is the identity plus l c_ij G_j^T N G_i / 2 between
+    the Gauss points j and i, l the length and c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta
+    method's matrix a and weights w.
     """
-
-    local: np.ndarray
-    increments: np.ndarray
-    motion: np.ndarray
-
-    def condensed(self) -> _Intervals | None:
-        """Return the form after elimination of what does not change the increments, 6 unknowns each; None if indefinite.
-
-        By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
-        """
-        if self.local.shape[1] <= _RIGID:
-            return self
-        axes = np.linalg.qr(self.increments.transpose(0, 2, 1), mode="complete")[0]
-        local, motion = axes.transpose(0, 2, 1) @ self.local @ axes, np.einsum("eij,ei->ej", axes, self.motion)
-        values, vectors = np.linalg.eigh(local[:, _RIGID:, _RIGID:])
-        if values.min() < _DEFINITE:
-            return None
-        coupled = local[:, :_RIGID, _RIGID:] @ vectors
-        local = local[:, :_RIGID, :_RIGID] - coupled / values[:, None] @ coupled.transpose(0, 2, 1)
-        return _Intervals(local, self.increments @ axes[:, :, :_RIGID], motion[:, :_RIGID])
-
-    def paired(self, coupling) -> _Intervals:
-        """Return pairs of intervals as one each; the number of intervals is even."""
-        first, last = self.increments[::2], self.increments[1::2]
-        across = first.transpose(0, 2, 1) @ coupling @ last / 2
-        upper = np.concatenate([self.local[::2], across], axis=2)
-        lower = np.concatenate([across.transpose(0, 2, 1), self.local[1::2]], axis=2)
-        motion = np.concatenate([self.motion[::2], self.motion[1::2]], axis=1)
-        return _Intervals(np.concatenate([upper, lower], axis=1), np.concatenate([first, last], axis=2), motion)
-
-    def split(self, at: int) -> tuple[_Intervals, _Intervals]:
-        """Return the first intervals, ``at`` of them, and the others."""
-        parts = self.local, self.increments, self.motion
-        return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
-
-    def joined(self, other: _Intervals) -> _Intervals:
-        """Return these intervals, followed by others."""
-        parts = zip((self.local, self.increments, self.motion), (other.local, other.increments, other.motion))
-        return _Intervals(*(np.concatenate(pair) for pair in parts))
-
-
-def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
-    """Return Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
-
-    It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
-    c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
-    """
-    tables = basis(degree)
     count, _, _, controls = points.generator.shape
+    size = degree * controls
+    room = max(size, 2 * _RIGID)
+    forms, increments, motion = np.zeros((count, room, room)), np.zeros((count, _RIGID, room)), np.zeros((count, room))
+    factors, roots = _on_interval(degree, controls)
+    generator = points.generator.transpose(0, 2, 1, 3).reshape(count, _RIGID, size)  # columns: Gauss point, function
+    half = points.lengths[:, None, None] / 2
+    forms[:, :size, :size] = np.eye(size) + half * (generator.transpose(0, 2, 1) @ (coupling @ generator) * factors)
+    roots = np.sqrt(points.lengths[:, None]) * roots
+    increments[:, :, :size], motion[:, :size] = generator * roots[:, None], points.motion.reshape(count, -1) * roots
+    return forms, increments, motion, size
+
+
+@functools.cache
+def _on_interval(degree: int, controls: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return c_ij of `_of_mesh`, and the roots of the weights, for so many functions at each Gauss point."""
+    tables = basis(degree)
     scaled = tables.runge_kutta * np.sqrt(tables.weights[:, None] / tables.weights)
-    generator = points.generator.transpose(0, 2, 1, 3).reshape(count, 6, -1)  # columns: Gauss point, function
-    local = generator.transpose(0, 2, 1) @ (coupling @ generator) * np.kron(scaled.T - scaled, np.ones((controls, controls)))
-    local = np.eye(degree * controls) + points.lengths[:, None, None] / 2 * local
-    roots = np.sqrt(points.lengths[:, None] * np.repeat(tables.weights, controls))
-    return _Intervals(local, generator * roots[:, None], points.motion.reshape(count, -1) * roots)
-
-
-def _condensed(intervals: _Intervals, coupling) -> _Intervals:
-    """Return intervals with six unknowns each, joined in pairs as long as the eliminated block is positive definite."""
-    found = intervals.condensed()
-    while found is not None:
-        intervals, even = found, len(found.local) // 2 * 2
-        if even == 0 or found.local.shape[1] < _RIGID:
-            break
-        pairs, rest = intervals.split(even)
-        found = pairs.paired(coupling).condensed()
-        found = found.joined(rest) if found is not None and len(rest.local) else found
-    return intervals
+    return np.kron(scaled.T - scaled, np.ones((controls, controls))), np.repeat(np.sqrt(tables.weights), controls)
 
 
 class _Form:
@@ -353,13 +302,17 @@ class _Form:
     def __init__(self, equilibrium: Equilibrium, points: _Points):
         self.symmetry, self.residual = equilibrium.symmetry, 0.0
         self.coupling = _symmetric(coupling(points.momentum, equilibrium.force), self.symmetry)
-        intervals = _condensed(_of_mesh(points, self.coupling, equilibrium.degree), self.coupling)
-        self.increments, self.motion = intervals.increments.transpose(1, 0, 2).reshape(_RIGID, -1), intervals.motion.ravel()
-        count, r, _ = intervals.local.shape
-        order = np.repeat(np.arange(count), r)
+        forms, increments, motion, size = _of_mesh(points, self.coupling, equilibrium.degree)
+        sizes, work = np.full(len(forms), size), np.empty((2, *forms.shape[1:]))
+        count = condense_forms(forms, increments, motion, self.coupling, _DEFINITE, sizes, work)
+        kept = np.arange(forms.shape[1]) < sizes[:count, None]
+        self.increments, self.motion = increments[:count].transpose(1, 0, 2)[:, kept], motion[:count][kept]
+        order, first = np.repeat(np.arange(count), sizes[:count]), 0
         self.matrix = self.increments.T @ self.coupling @ self.increments / 2 * np.sign(order - order[:, None])
-        blocks = self.matrix.reshape(count, r, count, r)
-        blocks[range(count), :, range(count)] += (intervals.local + intervals.local.transpose(0, 2, 1)) / 2
+        for form, size in zip(forms, sizes[:count]):
+            own = slice(first, first + size)
+            self.matrix[own, own] += (form[:size, :size] + form[:size, :size].T) / 2
+            first += size
 
     def classes(self) -> tuple[SymmetryClass, ...]:
         """Return every class; set ``residual``."""
@@ -395,18 +348,20 @@ class _Form:
         """Return the eigenvalues of a class under the conditions of closure, without the shift of phase ``known``."""
         closing, rows = _closing(self.symmetry, j)
         closing = closing.conj().T @ self.coupling
-        closing = (closing + closing.conj().T) / 2
-        form = form + (increments.conj().T @ (closing @ increments)).real
-        rows = rows @ increments
-        _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
-        out = rows[sizes > levels.DEPENDENT].T
-        known = known - out @ (out.T @ known)
-        if np.linalg.norm(known) > levels.DOUBLED:
-            known /= np.linalg.norm(known)
+        form = form + (increments.conj().T @ ((closing + closing.conj().T) / 2 @ increments)).real
+        out = np.empty((len(form), 0))
+        if len(rows):
+            rows = rows @ increments
+            _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
+            out = rows[sizes > levels.DEPENDENT].T
+            known = known - out @ (out.T @ known)
+        size = math.sqrt(known @ known)
+        if size > levels.DOUBLED:
+            known = known / size
             self.residual = max(self.residual, abs(float(known @ form @ known)))
             out = np.column_stack([out, known])
-        # between the projectors, and the identity on what they project out
-        image = form @ out
-        crossed = image @ out.T
-        inner = out @ (out.T @ image + np.eye(out.shape[1])) @ out.T
-        return np.linalg.eigvalsh(form - crossed - crossed.T + inner)
+        if out.size:  # between the projectors, and the identity on what they project out
+            image = form @ out
+            crossed = image @ out.T
+            form = form - crossed - crossed.T + out @ (out.T @ image + np.eye(out.shape[1])) @ out.T
+        return np.linalg.eigvalsh(form)
