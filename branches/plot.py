@@ -11,7 +11,7 @@ import math
 import sys
 from pathlib import Path
 
-from branches.store.command import Parser, complain, view_fault, write_output
+from branches.store.command import Parser, answered, check_view, write_output
 from branches.store.files import StoreError, check_picture, write_picture
 
 
@@ -50,20 +50,17 @@ def parser() -> Parser:
     return parser
 
 
+@answered(ValueError)
 def main(argv=None) -> int:
     """Draw; return the exit code."""
     options = parser().parse_args(argv)
     path = Path(options.result)
-    try:
-        is_diagram = path.is_dir() or path.suffix in (".yaml", ".yml", ".json")
-        _check(options, is_diagram)
-        figure, out, more = (_diagram if is_diagram else _branch)(options, path)
-        check_picture(out)
-        with _style(options.style):
-            write_picture(figure(), out)
-    except (StoreError, ValueError) as error:
-        complain(f"error: {error}")
-        return 2
+    is_diagram = path.is_dir() or path.suffix in (".yaml", ".yml", ".json")
+    _check(options, is_diagram)
+    figure, out, more = (_diagram if is_diagram else _branch)(options, path)
+    check_picture(out)
+    with _style(options.style):
+        write_picture(figure(), out)
     write_output(f"{more}written to {out}\n")
     return 0
 
@@ -105,8 +102,7 @@ def _check(options, is_diagram: bool) -> None:
         if getattr(options, name) is not None and getattr(options, name) is not False:
             kinds = ("a branch", "a diagram") if is_diagram else ("a diagram", "a branch")
             raise ValueError(f"--{name}: is for {kinds[0]}, and {options.result!r} is {kinds[1]}")
-    if fault := view_fault(options.view):
-        raise ValueError(fault)
+    check_view(options.view)
     if options.shapes is not None and not 0 <= options.shapes <= 12:
         raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
     if options.width is not None and not 0 < options.width <= 2:

@@ -27,7 +27,7 @@ from branches.scene.fields import ConfigError
 from branches.scene.labels import PRIMARY
 from branches.scene.parse import dump, parse
 from branches.store.branch import StoredBranch
-from branches.store.command import Parser, complain, write_output
+from branches.store.command import Parser, answered, write_output
 from branches.store.files import StoreError, check_folder_name, prepare, write_bytes
 from branches.store.read import complete_run, read_branch
 from contin import ContinError
@@ -233,18 +233,15 @@ def parser() -> Parser:
     return parser
 
 
+@answered()
 def main(argv=None) -> int:
     """Run the command; return the exit code."""
     options = parser().parse_args(argv)
     result = Path(options.result)
     folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")
-    try:
-        check_folder_name(folder)
-        with Progress("secondary bifurcations", quiet=options.quiet) as progress:
-            switches = follow_all(result, folder, options.set, progress)
-    except (ConfigError, StoreError, ContinError) as error:
-        complain(f"error: {error}")
-        return 2
+    check_folder_name(folder)
+    with Progress("secondary bifurcations", quiet=options.quiet) as progress:
+        switches = follow_all(result, folder, options.set, progress)
     counts = {outcome: sum(switch["outcome"] == outcome for switch in switches) for outcome in ("followed", "known", "failed")}
     write_output(
         f"{counts['followed']} secondary branches, {counts['known']} other ends of them, {counts['failed']} not followed; "

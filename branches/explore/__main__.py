@@ -6,14 +6,11 @@ import shlex
 import sys
 
 from branches.store import interrupt
+from branches.store.command import Parser, answered, typed, write_output
 
-EXIT_BAD_INPUT = 2
 
-
-def parser():
+def parser() -> Parser:
     """Return the command line."""
-    from branches.store.command import Parser
-
     parser = Parser(
         "explore", "Write one self-contained HTML page that shows results: the diagram, and the state at every point."
     )
@@ -26,27 +23,20 @@ def parser():
     return parser
 
 
+@answered()
 def main(argv=None) -> int:
     """Run the command; the exit code."""
-    from branches.store.command import complain, survive_any_encoding, typed, write_output
-
-    survive_any_encoding()
     options = parser().parse_args(argv)
     from branches.explore.gather import gather, left_out
     from branches.explore.page import assemble
-    from branches.store.files import StoreError, write_bytes
-    from contin import ContinError
+    from branches.store.files import write_bytes
 
-    try:
-        path = _page_path(options.out)
-        data = gather(options.results, options.quiet)
-        page = assemble(data).encode()
-        with interrupt.held():
-            write_bytes(path, page)
-            interrupt.change("the page is complete")
-    except (StoreError, ContinError) as error:
-        complain(f"error: {error}")
-        return EXIT_BAD_INPUT
+    path = _page_path(options.out)
+    data = gather(options.results, options.quiet)
+    page = assemble(data).encode()
+    with interrupt.held():
+        write_bytes(path, page)
+        interrupt.change("the page is complete")
     write_output(f"written to {path} ({len(page) / 1e6:.1f} MB); open it in a browser\n")
     if missing := left_out(data):
         write_output(

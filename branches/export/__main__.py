@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from branches.export import LIBRARIES
-from branches.store.command import Parser, Quantity, complain, survive_any_encoding, view_fault, write_output
+from branches.store.command import Parser, Quantity, answered, check_view, write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid command lines are answered at once
     from numpy import ndarray
@@ -21,7 +21,6 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid comman
     from branches.store.branch import StoredBranch
     from ribbon_model.shape import Shape
 
-EXIT_BAD_INPUT = 2
 #: Allowed endings of --out and --movie.
 SURFACES, MOVIES = tuple(LIBRARIES), (".gif", ".mp4")
 #: Least and largest number of frames: fewer than 2 show no motion; more than 2000 take minutes and hundreds of megabytes.
@@ -75,36 +74,31 @@ def parser() -> Parser:
     return parser
 
 
+@answered()
 def main(argv=None) -> int:
     """Run the command; return the exit code."""
-    survive_any_encoding()
     with interrupt.unwinding():  # unfinished files are removed
         return _export(parser().parse_args(argv))
 
 
 def _export(options) -> int:
-    from branches.scene.fields import ConfigError
-    from branches.store.files import StoreError, prepare, write_bytes
+    from branches.store.files import prepare, write_bytes
     from branches.store.read import read_branch
 
-    try:
-        check(options)
-        branch = read_branch(options.result)
-        files = _strip_files(branch, options) if options.out else {}
-        if options.table:
-            files[Path(options.table)] = _csv(branch.in_units())
-        for path in (*files, *([Path(options.movie)] if options.movie else [])):
-            prepare(path)
-        if options.movie:
-            from branches.export.film import film
+    check(options)
+    branch = read_branch(options.result)
+    files = _strip_files(branch, options) if options.out else {}
+    if options.table:
+        files[Path(options.table)] = _csv(branch.in_units())
+    for path in (*files, *([Path(options.movie)] if options.movie else [])):
+        prepare(path)
+    if options.movie:
+        from branches.export.film import film
 
-            width = options.width / (options.length or branch.length) * branch.shape_length if options.width else None
-            files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width, options.view)
-        for path, data in files.items():
-            write_bytes(path, data)
-    except (ConfigError, StoreError) as error:
-        complain(f"error: {error}")
-        return EXIT_BAD_INPUT
+        width = options.width / (options.length or branch.length) * branch.shape_length if options.width else None
+        files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width, options.view)
+    for path, data in files.items():
+        write_bytes(path, data)
     for path, data in files.items():
         write_output(f"written to {path} ({max(len(data) // 1000, 1)} kB)\n")
     return 0
@@ -120,8 +114,7 @@ def check(options) -> None:
     """
     from branches.scene.fields import ConfigError
 
-    if fault := view_fault(options.view):
-        raise ConfigError(fault)
+    check_view(options.view)
     if not (options.out or options.movie or options.table):
         raise ConfigError(
             "--out: is needed, as in --point LP --out strip.stl; or --movie, as in --movie fold.gif; or --table, as in "

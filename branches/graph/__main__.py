@@ -14,7 +14,7 @@ from pathlib import Path
 from branches.graph import closed as diagram
 from branches.graph.stored import CLOSED_FORMAT, OPEN_FORMAT, read_any
 from branches.scene.closed import and_nu
-from branches.store.command import Parser, complain, write_output
+from branches.store.command import Parser, answered, write_output
 from branches.store.files import StoreError
 
 
@@ -56,15 +56,12 @@ def parser() -> Parser:
     return parser
 
 
+@answered(KeyError)
 def main(argv=None) -> int:
     """Answer the queries; return the exit code."""
     options = parser().parse_args(argv)
-    try:
-        graph = read(options.folder)
-        lines = list({CLOSED_FORMAT: _of_closed_strips, OPEN_FORMAT: _of_open_strips}[graph.graph["format"]](graph, options))
-    except (StoreError, KeyError) as error:
-        complain(f"error: {error.args[0]}")
-        return 2
+    graph = read(options.folder)
+    lines = list({CLOSED_FORMAT: _of_closed_strips, OPEN_FORMAT: _of_open_strips}[graph.graph["format"]](graph, options))
     write_output("\n".join(lines) + "\n")
     return 0
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from branches.run.display import Progress
-from branches.store.command import Parser, complain, survive_any_encoding, write_output
+from branches.store.command import Parser, answered, write_output
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
     from branches.paper.page import Section
@@ -61,30 +61,24 @@ def parser() -> Parser:
     return parser
 
 
+@answered()
 def main(argv: Sequence[str] | None = None) -> int:
     """Compute what is asked for and write the page; the exit code: 0, or 2 for a request that cannot be met."""
     options = parser().parse_args(argv)
-    survive_any_encoding()
-    unknown = [name for name in options.items if name not in ITEMS]
-    if unknown:
-        from contin.lowlevel import meant
+    from branches.scene.fields import ConfigError
+    from branches.store.files import check_folder_name, prepare
+    from contin.lowlevel import meant
 
+    if unknown := [name for name in options.items if name not in ITEMS]:
         near = [f"{name!r}{meant(name, ITEMS)}" for name in unknown]
-        complain(f"error: there is no item {', '.join(near)}; known are {', '.join(ITEMS)}")
-        return 2
+        raise ConfigError(f"there is no item {', '.join(near)}; known are {', '.join(ITEMS)}")
     folder = Path(options.out)
-    from branches.store.files import StoreError, check_folder_name, prepare
-
     try:
         check_folder_name(folder)
         prepare(folder / "index.md")  # before the work, not after it
         _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS), options.quiet)
-    except StoreError as error:
-        complain(f"error: {error}")
-        return 2
     except OSError as error:
-        complain(f"error: cannot write to {folder}: {error.strerror or error}")
-        return 2
+        raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error
     return 0
 
 

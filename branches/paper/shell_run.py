@@ -24,8 +24,9 @@ from pathlib import Path
 
 from branches.run.display import Progress
 from branches.run.executor import cores, run_jobs
+from branches.scene.fields import ConfigError
 from branches.store import interrupt
-from branches.store.command import Parser, complain, survive_any_encoding, write_output
+from branches.store.command import Parser, answered, write_output
 from branches.store.files import StoreError, check_hdf5_name, only_run, prepare, write_bytes
 from contin.lowlevel import exact_text
 
@@ -37,7 +38,7 @@ TIME_LIMITS = {"thermal": 120.0, "direct": 600.0}
 BRACKET = 1e-3
 
 
-class ShellError(Exception):
+class ShellError(ConfigError):
     """CalculiX cannot be used at all; the message is one sentence."""
 
 
@@ -413,18 +414,14 @@ def parser() -> Parser:
     return parser
 
 
+@answered()
 def main(argv: Sequence[str] | None = None) -> int:
     """Compute the missing cases and list all; return the exit code: 0, 1 if a case failed, 2 for bad input."""
     options = parser().parse_args(argv)
-    survive_any_encoding()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinding also ends CalculiX
     cases = DEFAULT + FULLER if options.full else DEFAULT
-    try:
-        check_hdf5_name(options.out)
-        compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
-        outcomes = read(options.out)
-    except (ShellError, StoreError) as error:
-        complain(f"error: {error}")
-        return 2
+    check_hdf5_name(options.out)
+    compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
+    outcomes = read(options.out)
     write_output("\n".join(["", *map(describe, outcomes), ""]))
     return 1 if any(outcome.problem for outcome in outcomes) else 0

@@ -7,16 +7,15 @@ import os
 import sys
 
 from branches.store import interrupt
+from branches.store.command import Parser, answered, complain, write_output
 
 # Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
 
-EXIT_BAD_INPUT, EXIT_STOPPED_SHORT = 2, 1
+EXIT_STOPPED_SHORT = 1
 
 
-def parser():
+def parser() -> Parser:
     """Return the command line."""
-    from branches.store.command import Parser
-
     parser = Parser(
         "run",
         "Follow one branch of buckled equilibria of a closed elastic strip, or the stages of an open one, and write it to an "
@@ -50,11 +49,9 @@ def parser():
     return parser
 
 
+@answered()
 def main(argv=None) -> int:
     """Run the command; return the exit code."""
-    from branches.store.command import survive_any_encoding, write_output
-
-    survive_any_encoding()
     try:
         return _run(parser().parse_args(argv))
     finally:
@@ -64,40 +61,33 @@ def main(argv=None) -> int:
 def _run(options) -> int:
     from branches.scene.fields import ConfigError
     from branches.scene.parse import found, load
-    from branches.store.command import complain
-    from branches.store.files import StoreError
 
     options.config = found(options.config)
-    try:
-        if options.workers is not None and options.workers < 1:
-            raise ConfigError(f"--workers {options.workers}: must be at least 1")
-        if not options.time_limit > 0:
-            raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
-        if options.search is not None and not 1 <= options.search <= 1000:
-            raise ConfigError(f"--search {options.search}: must be from 1 to 1000")
-        scene = load(options.config, options.set)
-        for caution in next(iter(scene.scenes.values())).cautions:
-            complain(f"caution: {caution}")
-        if options.search is not None:
-            _check_search(scene)
-        if scene.many:
-            return _run_many(scene, options)
-        path = output_path(options)
-        scene = _with_stability(scene, path)
-        interrupt.change(f"nothing new is in {path}; the same command starts again")
-    except (ConfigError, StoreError) as error:
-        return _refuse(error)
+    if options.workers is not None and options.workers < 1:
+        raise ConfigError(f"--workers {options.workers}: must be at least 1")
+    if not options.time_limit > 0:
+        raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
+    if options.search is not None and not 1 <= options.search <= 1000:
+        raise ConfigError(f"--search {options.search}: must be from 1 to 1000")
+    scene = load(options.config, options.set)
+    for caution in next(iter(scene.scenes.values())).cautions:
+        complain(f"caution: {caution}")
+    if options.search is not None:
+        _check_search(scene)
+    if scene.many:
+        return _run_many(scene, options)
+    path = output_path(options)
+    scene = _with_stability(scene, path)
+    interrupt.change(f"nothing new is in {path}; the same command starts again")
     from branches.run.display import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.run.runner import run_scene
-    from contin import ContinError
 
     try:
         outcome = run_scene(scene, path, display, resume=options.resume, overwrite=options.overwrite)
-    except (ConfigError, StoreError, ContinError) as error:
+    finally:
         display.clear()
-        return _refuse(error)
     from branches.scene.stages import stages_of
 
     interrupt.change(f"{path} is {outcome}")
@@ -169,7 +159,7 @@ def _run_many(sweep, options) -> int:
     from pathlib import Path
 
     from branches.scene.fields import ConfigError
-    from branches.store.files import StoreError, check_folder_name
+    from branches.store.files import check_folder_name
 
     if options.resume:
         raise ConfigError(
@@ -180,28 +170,18 @@ def _run_many(sweep, options) -> int:
     from branches.run.display import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
-    from branches.run.executor import ExecutorError
     from branches.run.many import run_many
-    from contin import ContinError
 
     try:
         outcome = run_many(
             sweep, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
             overwrite=options.overwrite,
         )  # fmt: skip
-    except (StoreError, ExecutorError, ContinError) as error:
+    finally:
         display.clear()
-        return _refuse(error)
     if outcome == "complete" and options.search is not None:
         _tell_further(sweep, folder, display, options)
     return 0 if outcome == "complete" else EXIT_STOPPED_SHORT
-
-
-def _refuse(error: Exception) -> int:
-    from branches.store.command import complain
-
-    complain(f"error: {error}")
-    return EXIT_BAD_INPUT
 
 
 def output_path(options):

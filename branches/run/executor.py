@@ -22,8 +22,10 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from branches.scene.fields import ConfigError
 
-class ExecutorError(Exception):
+
+class ExecutorError(ConfigError):
     """A scheduler that cannot be used; the message is one sentence."""
 
 

@@ -13,7 +13,7 @@ from contin.lowlevel import exact_text, meant
 
 
 class ConfigError(Exception):
-    """A scene that cannot be run; the message is one sentence that names the field, the value and what is allowed."""
+    """A scene or an option that cannot be used; the message is one sentence: the field, the value and what is allowed."""
 
 
 class Strict(BaseModel):

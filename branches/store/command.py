@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import sys
+from collections.abc import Callable
 
 # Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
 
@@ -72,18 +74,42 @@ def _whole(text: str) -> int:
         raise argparse.ArgumentTypeError(f"{text!r} must be a whole number") from error
 
 
-def survive_any_encoding() -> None:
-    """Let standard output escape what its encoding lacks (± in ASCII, an odd file name) instead of failing."""
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="backslashreplace")
+def answered(*more: type[Exception]) -> Callable[[Callable], Callable[..., int]]:
+    """Return a decorator of the ``main`` of a command: what cannot be done is one line, and the exit code 2.
+
+    That is what ConfigError, StoreError and ContinError tell, and ``more`` errors. Standard output escapes what its encoding
+    lacks (± in ASCII, an odd file name) instead of failing.
+    """
+
+    def decorate(main: Callable) -> Callable[..., int]:
+        @functools.wraps(main)
+        def command(argv=None) -> int:
+            if hasattr(sys.stdout, "reconfigure"):
+                sys.stdout.reconfigure(errors="backslashreplace")
+            try:
+                return main(argv)
+            except Exception as error:
+                from branches.scene.fields import ConfigError  # these take .1 s, and are needed here only
+                from branches.store.files import StoreError
+                from contin import ContinError
+
+                if not isinstance(error, (ConfigError, StoreError, ContinError, *more)):
+                    raise
+                complain(f"error: {error.args[0] if isinstance(error, KeyError) else error}")
+                return 2
+
+        return command
+
+    return decorate
 
 
-def view_fault(view: list[float] | None) -> str | None:
-    """Return what is wrong with the option --view, in a sentence; None where nothing is."""
-    if view is None or (abs(view[0]) <= 360 and abs(view[1]) <= 90):
-        return None
-    asked = f"--view {view[0]:g} {view[1]:g}"
-    return f"{asked}: the azimuth must lie between -360 and 360, the elevation between -90 and 90 (degrees)"
+def check_view(view: list[float] | None) -> None:
+    """Raise ConfigError if the option --view is no direction."""
+    if view is not None and not (abs(view[0]) <= 360 and abs(view[1]) <= 90):
+        from branches.scene.fields import ConfigError
+
+        asked = f"--view {view[0]:g} {view[1]:g}"
+        raise ConfigError(f"{asked}: the azimuth must lie between -360 and 360, the elevation between -90 and 90 (degrees)")
 
 
 def complain(text: str) -> None:

@@ -54,7 +54,6 @@ def change(kept: str) -> None:
 def run(main: Callable[[], int]) -> int:
     """Call the ``main`` of a command; return its exit code, or that of an interrupted command.
 
-    What contin cannot do at all, as with a variable of the environment that it does not know, is one line and the exit code 2.
     Compiled code of other libraries may make another error of Ctrl-C: what comes after it is the interruption.
     """
     try:
@@ -62,12 +61,7 @@ def run(main: Callable[[], int]) -> int:
     except (Exception, KeyboardInterrupt) as error:
         if _State.raised or isinstance(error, KeyboardInterrupt):
             return _interrupted()
-        from contin import ContinError  # takes 20 ms, and is needed here only
-
-        if not isinstance(error, ContinError):
-            raise
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        raise
 
 
 def _interrupted() -> int:

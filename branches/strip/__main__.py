@@ -12,9 +12,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from branches.scene.fields import ConfigError
 from branches.scene.units import STRIP_UNITS
-from branches.store.command import Parser, Quantity, complain, survive_any_encoding, write_output
-from branches.store.files import StoreError, check_picture
+from branches.store.command import Parser, Quantity, answered, write_output
+from branches.store.files import check_picture
 from branches.strip.states import MOST_COVERINGS
 from ribbon_model.strip import Strip
 
@@ -43,18 +44,18 @@ def parser() -> Parser:
     return parser
 
 
+@answered()
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the answer; return the exit code: 0, or 2 for an invalid strip."""
     options = vars(parser().parse_args(argv))
-    survive_any_encoding()
     asked = {name: options.pop(name) for name in ("yield_strain", "want", "chart", "turns", "quiet")}
     try:
         _check(asked)
         strip = Strip(**options)
-    except (StoreError, ValueError) as error:
-        complain(f"error: {error}")
-        return 2
-    return _answer(strip, asked)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    _answer(strip, asked)
+    return 0
 
 
 def _check(asked: dict) -> None:
@@ -71,8 +72,8 @@ def _check(asked: dict) -> None:
         check_picture(Path(asked["chart"]))
 
 
-def _answer(strip: Strip, asked: dict) -> int:
-    """Write what is asked for; return the exit code."""
+def _answer(strip: Strip, asked: dict) -> None:
+    """Write what is asked for."""
     from threadpoolctl import threadpool_limits
 
     from branches.strip import report  # .5 s: not for a mistake in the dimensions
@@ -84,13 +85,8 @@ def _answer(strip: Strip, asked: dict) -> int:
         if asked["want"] is not None:
             write_output(report.dimensions(strip, turns, asked["want"], quiet))
         if asked["chart"] is not None:
-            try:
-                report.chart(strip, turns, Path(asked["chart"]), quiet)
-            except StoreError as error:
-                complain(f"error: {error}")
-                return 2
+            report.chart(strip, turns, Path(asked["chart"]), quiet)
             write_output(f"written to {asked['chart']}\n")
-    return 0
 
 
 if __name__ == "__main__":
