@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from pathlib import Path
 
 from branches.store import interrupt
 from branches.store.command import Parser, answered, typed, write_output
@@ -29,9 +30,11 @@ def main(argv=None) -> int:
     options = parser().parse_args(argv)
     from branches.explore.gather import gather, left_out
     from branches.explore.page import assemble
-    from branches.store.files import write_bytes
+    from branches.store.files import check_name, prepare, write_bytes
 
-    path = _page_path(options.out)
+    path = Path(options.out)
+    check_name(path, (".html", ".htm"))
+    prepare(path)
     data = gather(options.results, options.quiet)
     page = assemble(data).encode()
     with interrupt.held():
@@ -44,21 +47,6 @@ def main(argv=None) -> int:
             f"results has them, as in: {typed('explore')} {shlex.quote(missing[0]['path'])}\n"
         )
     return 0
-
-
-def _page_path(out: str):
-    """Return where the page goes; raise StoreError where none can be written."""
-    from pathlib import Path
-
-    from branches.store.files import StoreError, prepare
-
-    path = Path(out)
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise StoreError(f"--out {out!r}: must end in .html")
-    if path.exists() and not path.is_file():
-        raise StoreError(f"--out {out!r}: must be a file")
-    prepare(path)
-    return path
 
 
 if __name__ == "__main__":

@@ -109,10 +109,11 @@ def check(options) -> None:
 
     Raises
     ------
-    ConfigError
+    ConfigError, StoreError
         An invalid option; the message names it, its value and what is allowed.
     """
     from branches.scene.fields import ConfigError
+    from branches.store.files import check_name
 
     check_view(options.view)
     if not (options.out or options.movie or options.table):
@@ -136,12 +137,7 @@ def check(options) -> None:
     seen = {Path(options.result).resolve(): "is the result itself"}
     for option, name, endings in names:
         path = Path(name)
-        if path.suffix.lower() not in endings:
-            raise ConfigError(
-                f"{option} {name!r}: must end in {' or '.join(filter(None, (', '.join(endings[:-1]), endings[-1])))}"
-            )
-        if path.exists() and not path.is_file():
-            raise ConfigError(f"{option} {name!r}: must be a file")
+        check_name(path, endings, option)
         if path.resolve() in seen:
             raise ConfigError(f"{option} {name!r}: {seen[path.resolve()]}; name another file")
         seen[path.resolve()] = "is named twice"

@@ -27,7 +27,7 @@ from branches.run.executor import cores, run_jobs
 from branches.scene.fields import ConfigError
 from branches.store import interrupt
 from branches.store.command import Parser, answered, write_output
-from branches.store.files import StoreError, check_hdf5_name, only_run, prepare, write_bytes
+from branches.store.files import BRANCHES, StoreError, check_name, only_run, prepare, write_bytes
 from contin.lowlevel import exact_text
 
 PROGRAM = "ccx"
@@ -420,7 +420,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser().parse_args(argv)
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinding also ends CalculiX
     cases = DEFAULT + FULLER if options.full else DEFAULT
-    check_hdf5_name(options.out)
+    check_name(options.out, BRANCHES)
     compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
     outcomes = read(options.out)
     write_output("\n".join(["", *map(describe, outcomes), ""]))

@@ -195,7 +195,7 @@ def output_path(options):
     from pathlib import Path
 
     from branches.scene.fields import ConfigError
-    from branches.store.files import BRANCHES, check_hdf5_name
+    from branches.store.files import BRANCHES, check_name
 
     if options.out == "":
         raise ConfigError("--out '': must name a file or a folder")
@@ -210,7 +210,7 @@ def output_path(options):
             raise ConfigError(f"--out {str(path)!r}: is neither a file nor a folder")
         if path.exists() and path.samefile(options.config):
             raise ConfigError(f"--out {str(path)!r}: is the config itself; name another file")
-        check_hdf5_name(path, or_folder=True)
+        check_name(path, BRANCHES, instead=f", or be a folder, as in {path.stem + '/'!r}")
     except OSError as error:
         raise ConfigError(f"--out {str(path)!r}: cannot be accessed: {error.strerror}") from error
     return path

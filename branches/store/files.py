@@ -8,7 +8,7 @@ import io
 import os
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -57,11 +57,13 @@ BRANCHES = (".h5", ".hdf5")
 _OF_FILES = (*BRANCHES, ".csv", ".htm", ".html", ".json", ".npz", ".pdf", ".png", ".svg", ".yaml", ".yml")
 
 
-def check_hdf5_name(path: Path, or_folder: bool = False) -> None:
-    """Raise StoreError if ``path`` is no name for an HDF5 file; ``or_folder`` says that a folder could be named instead."""
-    if path.suffix.lower() not in BRANCHES:
-        more = f", or be a folder, as in {path.stem + '/'!r}" if or_folder else ""
-        raise StoreError(f"--out {str(path)!r}: must end in {' or '.join(BRANCHES)}{more}")
+def check_name(path: Path, endings: Sequence[str], option: str = "--out", instead: str = "") -> None:
+    """Raise StoreError if ``path`` has none of these endings, or is no file; ``instead`` says what else could be named."""
+    if path.suffix.lower() not in endings:
+        known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+        raise StoreError(f"{option} {str(path)!r}: must end in {known}{instead}")
+    if path.exists() and not path.is_file():
+        raise StoreError(f"{option} {str(path)!r}: must be a file")
 
 
 def check_folder_name(path: Path) -> None:
@@ -227,10 +229,7 @@ def prepare(path: Path) -> None:
 
 def check_picture(path: Path) -> None:
     """Raise StoreError if ``path`` is not a picture that can be written."""
-    if path.suffix.lower() not in (".pdf", ".svg", ".png"):
-        raise StoreError(f"--out {str(path)!r}: must end in .pdf, .svg or .png")
-    if path.exists() and not path.is_file():
-        raise StoreError(f"--out {str(path)!r}: must be a file")
+    check_name(path, (".pdf", ".svg", ".png"))
     prepare(path)
 
 
