@@ -40,6 +40,8 @@ from ribbon_model.modes import Mode
 def follow_all(result: Path, folder: Path, settings: list[str], progress: Progress) -> list[dict]:
     """Follow every secondary branch of a result, in the same folder as a diagram with the primary ones.
 
+    Raises StoreError or ConfigError for a result or a setting that cannot be used.
+
     Parameters
     ----------
     result : Path
@@ -55,11 +57,6 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
     -------
     list of dict
         Every attempt to switch branches, as kept in the diagram under ``switches`` (JSON).
-
-    Raises
-    ------
-    StoreError, ConfigError
-        A result or a setting that cannot be used.
     """
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)

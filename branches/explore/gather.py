@@ -27,6 +27,8 @@ _MOST_BYTES = 22_500_000
 def gather(results: list[str], quiet: bool = True) -> dict:
     """Everything the page needs, ready for JSON; unless ``quiet``, a line of progress is shown.
 
+    Raises StoreError where one of them cannot be read, holds no branch, or is of the other kind.
+
     Parameters
     ----------
     results : list of str
@@ -37,11 +39,6 @@ def gather(results: list[str], quiet: bool = True) -> dict:
     dict
         ``title``; ``kind``: 'strips', 'open' or 'branches'; ``axes``: columns of the map (name, title, short name), of which
         ``shown`` are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
-
-    Raises
-    ------
-    StoreError
-        One of them cannot be read, holds no branch, or is of the other kind.
     """
     files: dict[Path, Path] = {}
     titles = []

@@ -20,10 +20,7 @@ KINDS = {Label.FOLD: "fold", Label.BRANCH_POINT: "secondary", Label.HOPF: "hopf"
 def gathered(files: list[Path]) -> dict:
     """Return the data of a page of stored branches; see `branches.explore.gather.gather`.
 
-    Raises
-    ------
-    StoreError
-        A file cannot be read or has fewer than two points, or the files have no free parameter in common.
+    Raises StoreError where a file cannot be read or has fewer than two points, or the files have no free parameter in common.
     """
     stored = [each for path in files for each in _read(path)]
     columns, first = [one.columns for *_, one in stored], stored[0][2]

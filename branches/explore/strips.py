@@ -68,12 +68,7 @@ def branch_of(path: Path, slow: bool = True) -> dict:
     """Return what the page holds of a branch file; ``family`` and ``reach`` are for `family_of` alone.
 
     With ``slow``, it holds what takes seconds: the ways down from folds that a stable strip reaches, and the exact solution of
-    a law that the page does not know.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be read, or it holds fewer than two points.
+    a law that the page does not know. Raises StoreError where the file cannot be read, or it holds fewer than two points.
     """
     with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
         return _branch(path, read_kind(path, CLOSED), slow)
@@ -273,12 +268,8 @@ _FAR, _FILLED = 1.1, 0.92
 def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     """Return the data of a page of open strips or networks, each stage as a branch; see `branches.explore.gather.gather`.
 
-    With ``slow``, it says what strips do past folds, which takes seconds for each.
-
-    Raises
-    ------
-    StoreError
-        A file of another kind or in other units, or without a column in common with the others.
+    With ``slow``, it says what strips do past folds, which takes seconds for each. Raises StoreError for a file of another kind
+    or in other units, or without a column in common with the others.
     """
     kind = read_branch(files[0]).scene.KIND
     branches = [(path, read_kind(path, kind)) for path in files]
@@ -403,12 +394,8 @@ def solutions(branch: StoredBranch) -> list[Discretized | None]:
     """Return the solution of every point, in order; None for a point at which Newton's method does not find it.
 
     The parameters of a point are columns, so solutions between two that the file keeps are found as on the branch itself, by a
-    secant and Newton's method: from the first of the two on its mesh, and where that fails from the second on its mesh.
-
-    Raises
-    ------
-    StoreError
-        A solution that the file keeps does not belong to the columns of its point.
+    secant and Newton's method: from the first of the two on its mesh, and where that fails from the second on its mesh. Raises
+    StoreError where a solution that the file keeps does not belong to the columns of its point.
     """
     kept = {number: _kept(branch, number) for number in branch.kept().tolist()}
     found: list[Discretized | None] = [kept.get(number) for number in range(len(branch.points))]

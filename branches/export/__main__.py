@@ -107,10 +107,7 @@ def _export(options) -> int:
 def check(options) -> None:
     """Check the options that can be checked without the result.
 
-    Raises
-    ------
-    ConfigError, StoreError
-        An invalid option; the message names it, its value and what is allowed.
+    Raises ConfigError or StoreError for an invalid option; the message names it, its value and what is allowed.
     """
     from branches.scene.fields import ConfigError
     from branches.store.files import check_name
@@ -149,10 +146,7 @@ def check(options) -> None:
 def labelled_point(branch: StoredBranch, text: str) -> int:
     """Return the row of a labelled point in the table of points, from its LAB (from 1) or its label.
 
-    Raises
-    ------
-    ConfigError
-        There is none, or there are several; the message lists the labelled points.
+    Raises ConfigError where there is none, or there are several; the message lists the labelled points.
     """
     from branches.scene.fields import ConfigError
 

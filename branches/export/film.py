@@ -34,6 +34,8 @@ def film(
 ) -> bytes:  # fmt: skip
     """The film of a branch, as the content of a file; a GIF goes back the way it came and begins again.
 
+    Raises StoreError where the branch keeps fewer than two solutions, or what writes this format is not installed.
+
     Parameters
     ----------
     branch : branches.store.branch.StoredBranch
@@ -46,11 +48,6 @@ def film(
         Width of the drawn strip, in units of L/2 pi; see `branches.store.branch.StoredBranch.drawn_width`.
     view : (float, float), optional
         The side from which the strip is seen, as of `branches.draw.picture.figure`.
-
-    Raises
-    ------
-    StoreError
-        The branch keeps fewer than two solutions; or what writes this format is not installed.
     """
     kept = branch.kept().tolist()
     if len(kept) < 2:

@@ -20,10 +20,7 @@ _COLOUR = (232, 163, 61, 255)
 def library(ending: str):
     """Return the library that writes files with this ending.
 
-    Raises
-    ------
-    StoreError
-        It is not installed; the message says what to install.
+    Raises StoreError where it is not installed; the message says what to install.
     """
     name = LIBRARIES[ending]
     try:
@@ -36,7 +33,7 @@ def library(ending: str):
 
 
 def encode(mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
-    """Return a mesh as the content of a file.
+    """Return a mesh as the content of a file; raise StoreError where the library that writes this format is not installed.
 
     Parameters
     ----------
@@ -46,11 +43,6 @@ def encode(mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
         One of `branches.export.LIBRARIES`.
     fields : mapping of str to ndarray, shape (K, ...)
         Values at the nodes of the centreline; VTK files hold them.
-
-    Raises
-    ------
-    StoreError
-        The library that writes this format is not installed.
     """
     if LIBRARIES[ending] == "meshio":
         return _by_meshio(library(ending), mesh, ending, fields)

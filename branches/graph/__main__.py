@@ -21,10 +21,7 @@ from branches.store.files import StoreError
 def read(path: str | Path):
     """Return the diagram in a folder (or in a ``diagram.json``); for a scene, its preview (`branches.graph.closed`).
 
-    Raises
-    ------
-    StoreError
-        There is none, or the scene is none.
+    Raises StoreError where there is none, or the scene is none.
     """
     if Path(path).suffix not in (".yaml", ".yml"):
         return read_any(path)

@@ -157,10 +157,7 @@ def _same(state: State, near: State, others: list[dict]) -> bool:
 def solved(system: Collocation, x: np.ndarray) -> tuple[dict[str, float], dict[str, float]]:
     """Return kappa_star and energy of the state near a guess, at the kappa_n of the system, and their errors.
 
-    Raises
-    ------
-    ConvergenceError
-        There is no state, on this mesh or with every interval halved.
+    Raises ConvergenceError where there is no state, on this mesh or with every interval halved.
     """
     found = correct(system, x)
     point = point_of(system, found.x, found.iterations, found.error)

@@ -213,10 +213,7 @@ def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[
 def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
     """Return the special points along the branch (m, n), in order from the m-covered circle, for the given law and nu or all.
 
-    Raises
-    ------
-    KeyError
-        The diagram has no such branch.
+    Raises KeyError where the diagram has no such branch.
     """
     result = []
     for (law_, nu_, _, n_), nodes in courses(graph):

@@ -58,10 +58,7 @@ def _lines(data: dict) -> str:
 def read(folder: str | Path):
     """Return the diagram in a folder, or in a ``diagram.json``.
 
-    Raises
-    ------
-    StoreError
-        There is none, or it is of open strips.
+    Raises StoreError where there is none, or it is of open strips.
     """
     graph = read_any(folder)
     if graph.graph["format"] != CLOSED_FORMAT:
@@ -70,13 +67,7 @@ def read(folder: str | Path):
 
 
 def read_any(folder: str | Path):
-    """Return the diagram in a folder; it may also be of open strips.
-
-    Raises
-    ------
-    StoreError
-        There is none.
-    """
+    """Return the diagram in a folder; it may also be of open strips. Raises StoreError where there is none."""
     import networkx
 
     path = Path(folder)

@@ -87,13 +87,7 @@ STORED = "index.json"
 
 
 def read(folder: Path) -> dict[str, Section]:
-    """The sections that earlier calls put on the page of a folder, by item.
-
-    Raises
-    ------
-    StoreError
-        They cannot be read.
-    """
+    """The sections that earlier calls put on the page of a folder, by item; raise StoreError where they cannot be read."""
     path = folder / STORED
     if not path.exists():
         return {}

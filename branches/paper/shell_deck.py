@@ -232,10 +232,7 @@ _TABLE, _BLOCK = "E I G E N V A L U E   O U T P U T", re.compile(r"\s*displaceme
 def states(text: str, strip: Strip) -> list[State]:
     """Return the complete states of a ``.dat`` file, in the order of the deck; a failed run has fewer.
 
-    Raises
-    ------
-    ValueError
-        A state without an out-of-plane vibration among those printed.
+    Raises ValueError for a state without an out-of-plane vibration among those printed.
     """
     found, shape, values, modes = [], None, [], []
     for kind, content in _tables(text):

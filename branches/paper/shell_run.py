@@ -116,13 +116,7 @@ class Outcome:
 
 
 def version() -> str:
-    """Return the version of CalculiX.
-
-    Raises
-    ------
-    ShellError
-        It is not installed, or does not run.
-    """
+    """Return the version of CalculiX; raise ShellError where it is not installed, or does not run."""
     program = shutil.which(PROGRAM)
     if program is None:
         raise ShellError(INSTALL)
@@ -227,12 +221,8 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
 
     Steps are taken until the sign changes, but hardly beyond the zero of the straight line through the last two points, because
     CalculiX is slow or fails beyond the zero. Then false position, or halving where that is one-sided, until the bracket is not
-    wider than `BRACKET`. Where the function has no value, points nearer to the last value are tried.
-
-    Raises
-    ------
-    Unusable
-        There is no positive value at the first point, or no zero before the function has no value any more.
+    wider than `BRACKET`. Where the function has no value, points nearer to the last value are tried. Raises Unusable where
+    there is no positive value at the first point, or no zero before the function has no value any more.
     """
     low, at_low, falls_to_zero = first, function(first), math.inf
     if at_low <= 0:
@@ -284,14 +274,8 @@ def compute(
     """Compute the cases that the file at ``path`` does not hold yet, one on each core, and keep each when it is finished.
 
     A case that failed before is tried again. ``report(outcome, left)`` is called after each. Unless ``quiet``, a line of
-    progress is shown.
-
-    Raises
-    ------
-    ShellError
-        CalculiX is not installed, and there are cases to compute.
-    StoreError
-        The file cannot be read or written.
+    progress is shown. Raises ShellError where CalculiX is not installed, and there are cases to compute; StoreError where the
+    file cannot be read or written.
     """
     kept = {outcome.case: outcome for outcome in read(path)}
     missing = [case for case in cases if case not in kept or kept[case].problem]
@@ -324,13 +308,7 @@ _FIELDS = ("way", "nu", "slenderness", "thinness", "along", "across", "first", "
 
 
 def read(path: Path) -> list[Outcome]:
-    """Return all outcomes of a file; none if there is no file.
-
-    Raises
-    ------
-    StoreError
-        It is not a file of shell results.
-    """
+    """Return all outcomes of a file; none if there is no file. Raises StoreError where it is not a file of shell results."""
     if not path.exists():
         return []
     import h5py

@@ -187,10 +187,8 @@ def _run_many(sweep, options) -> int:
 def output_path(options):
     """Return the result file of the command line.
 
-    Raises
-    ------
-    ConfigError, StoreError
-        A name that is not that of a branch, or a file or folder in its place that no result may replace.
+    Raises ConfigError or StoreError for a name that is not that of a branch, or a file or folder in its place that no result
+    may replace.
     """
     from pathlib import Path
 

@@ -39,6 +39,9 @@ def executor(
 ) -> Iterator[tuple[Submit, Wait, int]]:
     """Yield ``submit(function, job)``, which returns a future, a function that waits for some, and the number of parallel jobs.
 
+    Raises ExecutorError where Dask is not installed, the scheduler does not answer or has no workers, or all of its workers
+    have left.
+
     Parameters
     ----------
     scheduler : str, optional
@@ -48,11 +51,6 @@ def executor(
     time_limit : float, optional
         Seconds after which a job in a local process is killed; its future then raises TimeoutError. If a process dies,
         only its own job fails.
-
-    Raises
-    ------
-    ExecutorError
-        Dask is not installed, the scheduler does not answer or has no workers, or all of its workers have left.
     """
     if scheduler is None:
         count = workers or cores()

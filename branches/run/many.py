@@ -85,6 +85,9 @@ def run_many(
 ) -> str:
     """Compute the branches of a scene that ``folder`` does not hold yet, and the graph of all.
 
+    Raises StoreError where the folder cannot be written to, another run is writing to it, or it holds another scene and
+    ``overwrite`` is not set; ExecutorError where the scheduler cannot be used.
+
     Parameters
     ----------
     time_limit : float, optional
@@ -94,13 +97,6 @@ def run_many(
     -------
     str
         "complete", or "lost" if a branch failed or was lost on the way (the others are there).
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be written to, another run is writing to it, or it holds another scene and ``overwrite`` is not set.
-    ExecutorError
-        The scheduler cannot be used.
     """
     began, folder = time.perf_counter(), Path(folder)
     kind = graph_kind(sweep)
@@ -123,11 +119,8 @@ def run_many(
 def _kept(sweep: Sweep, folder: Path, kind: ModuleType) -> dict[str, Any]:
     """Return the parts of the complete branches in the folder, by file.
 
-    Raises
-    ------
-    StoreError
-        A branch in the folder would be replaced, or would no longer be in a diagram. (A scene with the same branches and
-        further ones is accepted.)
+    Raises StoreError where a branch in the folder would be replaced, or would no longer be in a diagram. (A scene with the same
+    branches and further ones is accepted.)
     """
     kept = {}
     for file, scene in _stored_scenes(sweep, folder).items():

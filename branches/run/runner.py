@@ -38,15 +38,13 @@ if TYPE_CHECKING:
 def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool = False, overwrite: bool = False) -> str:
     """Follow the stages of ``scene`` into the file ``path``, telling ``display`` about it.
 
+    Raises StoreError or ConfigError for a result file that cannot be written, that another run is writing, or that belongs to
+    another scene.
+
     Returns
     -------
     str
         "complete", "interrupted" (Ctrl-C or SIGTERM; the file can be resumed), or "lost" (no further state was found).
-
-    Raises
-    ------
-    StoreError, ConfigError
-        A result file that cannot be written, that another run is writing, or that belongs to another scene.
     """
     path = Path(path)
     with _writing(path, display, resume) as resume:
@@ -101,10 +99,7 @@ def compute_scene(scene: Scene, display: Display) -> Computed:
 def whole_branch(scene: Scene, path: Path, display: Display) -> None:
     """Follow the branch of ``scene`` into the file ``path``; errors as of `run_scene`.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        The run was interrupted; the file holds the points before.
+    Raises KeyboardInterrupt where the run was interrupted; the file holds the points before.
     """
     if run_scene(scene, path, display, overwrite=True) == "interrupted":
         raise KeyboardInterrupt
@@ -238,10 +233,7 @@ def _points(problem, image: bytes) -> list[Point]:
 def _writing(path: Path, display: Display, resume: bool) -> Iterator[bool]:
     """Make the folder of a result file and lock the file for this run; the value is whether there is a run to resume.
 
-    Raises
-    ------
-    StoreError
-        The file cannot be written, or another run is writing it.
+    Raises StoreError where the file cannot be written, or another run is writing it.
     """
     if not path.exists():
         if resume:

@@ -126,10 +126,7 @@ class ClosedScene(Scene):
     def at_bifurcation(self) -> dict[Column, float]:
         """Return the columns on the circle where the branch starts (there the strain is omega = (m, 0, 0)).
 
-        Raises
-        ------
-        ValueError
-            The mode has no bifurcation; see `ribbon_model.linear.thresholds`.
+        Raises ValueError where the mode has no bifurcation; see `ribbon_model.linear.thresholds`.
         """
         from ribbon_model.linear import circle, thresholds
 

@@ -226,10 +226,8 @@ def settings_of(scene: ClosedScene, events=()) -> Settings:
 def seed(scene: ClosedScene):
     """Return system, first point and tangent of a scene's branch.
 
-    Raises
-    ------
-    ConfigError
-        The first mesh is too coarse to resolve the mode, or resolves another one; or the origin is invalid.
+    Raises ConfigError where the first mesh is too coarse to resolve the mode, or resolves another one; or the origin is
+    invalid.
     """
     if scene.origin:
         return _leave_primary(scene)
@@ -257,10 +255,7 @@ def seed(scene: ClosedScene):
 def _leave_primary(scene: ClosedScene):
     """Return system, first point and tangent of a secondary branch; the primary branch is followed to the origin.
 
-    Raises
-    ------
-    ConfigError
-        The primary branch does not pass through the origin, or no branch leaves it there.
+    Raises ConfigError where the primary branch does not pass through the origin, or no branch leaves it there.
     """
     from ribbon_model.solution import Solution  # 10 ms, which other branches do not need
 

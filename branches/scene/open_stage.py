@@ -136,13 +136,7 @@ class OpenStage(Stage):
         return f"{name} = {value * self.scene.factor(name):.10g} {self.scene.unit(name)}".rstrip()
 
     def _origin(self, labelled: Sequence[Sequence[Point]]) -> Point:
-        """Return the labelled point from which a stage starts.
-
-        Raises
-        ------
-        ConfigError
-            There is none.
-        """
+        """Return the labelled point from which a stage starts; raise ConfigError where there is none."""
         stage = self.stage
         source = stage.stage or self.number - 1
         points = labelled[source - 1]
@@ -153,13 +147,7 @@ class OpenStage(Stage):
         return points[place]
 
     def _run(self, origin: Point) -> Continuation:
-        """Return the run of a stage.
-
-        Raises
-        ------
-        ConfigError
-            The stage starts outside its limits, or not from this point.
-        """
+        """Return the run of a stage; raise ConfigError where the stage starts outside its limits, or not from this point."""
         try:
             run = self._begun(origin)
         except ConvergenceError as error:
@@ -213,10 +201,7 @@ class OpenStage(Stage):
     def _switched(self, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:
         """Return the settings and the first tangent of a stage that leaves a branch point.
 
-        Raises
-        ------
-        ConfigError
-            No single branch leaves it, or not in this stage.
+        Raises ConfigError where no single branch leaves it, or not in this stage.
         """
         stage = self.stage
         if not origin.is_simple_branch_point:

@@ -256,10 +256,7 @@ class StagedScene(Scene):
     def strip(self, stage: int = 1) -> Any:
         """Return the `ribbon_model.network.Network` of a stage, from 1: an `OpenStrip` of an open strip.
 
-        Raises
-        ------
-        ValueError
-            Fields that do not fit; one sentence.
+        Raises ValueError for fields that do not fit; one sentence.
         """
         held = self._held(stage)
         if repr(held) not in self._strips:
@@ -375,10 +372,7 @@ class StagedScene(Scene):
     def first(self, grows: Mapping[str, float], options: dict[str, Any]) -> tuple[Any, str]:
         """Return the state from which the first stage starts, a `contin.Point`, and how it was found, in words; '' for nothing.
 
-        Raises
-        ------
-        ConfigError
-            There is none, or nothing determines it.
+        Raises ConfigError where there is none, or nothing determines it.
         """
 
     @abstractmethod

@@ -29,10 +29,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
     """Return the scene of a YAML file, changed by ``key=value`` settings (dotted keys, YAML values).
 
-    Raises
-    ------
-    ConfigError
-        A file that cannot be read, or a field that is unknown, of the wrong type or invalid.
+    Raises ConfigError for a file that cannot be read, or a field that is unknown, of the wrong type or invalid.
     """
     try:
         with open(path, "rb") as file:
@@ -93,10 +90,7 @@ def _validated(kind: type[Scene], values: dict, name: str, settings: Sequence[st
 def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str, settings: Sequence[str]) -> Sweep:
     """Return the scenes of all combinations of the lists' values.
 
-    Raises
-    ------
-    ValueError, ConfigError
-        A field that is invalid in every combination, or a combination that is given twice.
+    Raises ValueError or ConfigError for a field that is invalid in every combination, or a combination that is given twice.
     """
     from branches.scene.sweep import Sweep, combinations  # most scenes are of one branch
 

@@ -95,10 +95,7 @@ class Stage(ABC):
     def start(self, earlier: Sequence[Sequence[Point]]) -> Continuation:
         """Return the run from its first point; ``earlier`` are the labelled points of the stages before.
 
-        Raises
-        ------
-        ConfigError
-            It has no first point.
+        Raises ConfigError where it has no first point.
         """
 
     @abstractmethod

@@ -28,12 +28,7 @@ UNITS = {
 
 
 def quantity(text: str, unit: str) -> float:
-    """Return a number as it is, or one with a unit in the SI ``unit``.
-
-    Raises
-    ------
-    ValueError
-        Neither.
+    """Return a number as it is, or one with a unit in the SI ``unit``; raise ValueError for another text.
 
     Examples
     --------

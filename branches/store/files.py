@@ -37,10 +37,7 @@ def another_scene(folder: Path, reason: str) -> StoreError:
 def write_bytes(path: Path, data: bytes) -> None:
     """Replace the file ``path`` (or the file it links to) as a whole, with its mode, or leave it unchanged.
 
-    Raises
-    ------
-    StoreError
-        It cannot be written.
+    Raises StoreError where it cannot be written.
     """
     try:
         with interrupt.held():
@@ -121,12 +118,8 @@ def only_run(path: Path) -> Iterator[None]:
     """Lock ``path`` for this run; another run, of this process or of any other that uses the folder, is refused.
 
     The lock is the operating system's, on a hidden file beside ``path``. It ends with the process in all cases, and a
-    remaining lock file has no effect. On a file system without locks nothing is locked.
-
-    Raises
-    ------
-    StoreError
-        Another run holds the lock.
+    remaining lock file has no effect. On a file system without locks nothing is locked. Raises StoreError where another run
+    holds the lock.
     """
     path = Path(os.path.realpath(path))
     if path in _held or not _lock(path):
@@ -202,10 +195,7 @@ interrupt.at_last(unlock_all)
 def prepare(path: Path) -> None:
     """Make the folder of ``path``, check that a result can be written, and remove files of killed runs.
 
-    Raises
-    ------
-    StoreError
-        Nothing can be written there.
+    Raises StoreError where nothing can be written there.
     """
     path = Path(os.path.realpath(path))
     try:

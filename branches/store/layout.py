@@ -52,10 +52,7 @@ def _require(fact: object, what: str) -> None:
 def check(file: h5py.File, path: Path) -> None:
     """See that a file is a branch that can be read.
 
-    Raises
-    ------
-    StoreError
-        It is none, one of another version, or damaged; with what is wrong.
+    Raises StoreError where it is none, one of another version, or damaged; with what is wrong.
     """
     if file.attrs.get("format") != FORMAT:
         raise StoreError(f"cannot read {str(path)!r}: it is not a branch written by this program")
@@ -111,10 +108,7 @@ def _check_solutions(file: h5py.File, points: int) -> None:
 def dataset(group: h5py.Group, name: str, dimensions: int, kinds: str) -> h5py.Dataset:
     """A dataset of a file, of so many dimensions, of a kind of numbers (letters of numpy), no larger than the file can hold.
 
-    Raises
-    ------
-    KeyError, ValueError
-        There is none; it is another.
+    Raises KeyError or ValueError where there is none, or it is another.
     """
     found = group[name]
     _require(isinstance(found, h5py.Dataset) and not found.external and not found.is_virtual, f"/{name} is no plain dataset")

@@ -141,6 +141,8 @@ class BranchWriter:
     def checkpoint(self, start, status: str, stop: Stop | None = None) -> None:
         """Write all points so far, and the state for a resumed run.
 
+        Raises StoreError where the file cannot be written; the file on disk is unchanged.
+
         Parameters
         ----------
         start : tuple (system, x, tangent)
@@ -149,11 +151,6 @@ class BranchWriter:
             "running", "complete", "interrupted" or "lost".
         stop : Stop, optional
             The reason why it ended.
-
-        Raises
-        ------
-        StoreError
-            The file cannot be written; the file on disk is unchanged.
         """
         began = time.monotonic()
         self.flush()
@@ -272,10 +269,7 @@ def _extend(dataset, rows):
 def open_branch(path: Path):
     """Open the HDF5 file of a branch for reading.
 
-    Raises
-    ------
-    StoreError
-        The file does not exist, is not HDF5, or is not a branch that this version reads.
+    Raises StoreError where the file does not exist, is not HDF5, or is not a branch that this version reads.
     """
     try:
         file = h5py.File(path, "r")
@@ -289,10 +283,7 @@ def open_branch(path: Path):
 def read_state(path: Path, problem, free):
     """Return the saved state of a run, its first point (system, x, tangent), the row before the state, and the file's image.
 
-    Raises
-    ------
-    StoreError
-        The file holds no saved state.
+    Raises StoreError where the file holds no saved state.
     """
     with open_branch(path) as file:
         if "resume" not in file:

@@ -274,10 +274,7 @@ def _solutions(strip: Strip, name: str, m: int, wanted: float, places, values) -
 def chart(strip: Strip, m: int, out: Path, quiet: bool = True, Gammas=_GAMMAS, parts=_PARTS) -> None:
     """Draw the barrier of the m-fold circle over Gamma and parts of the stable interval, with the strip as a point in it.
 
-    Raises
-    ------
-    StoreError
-        The picture cannot be written.
+    Raises StoreError where the picture cannot be written.
     """
     kappas, table = [], []
     with Progress("widths", len(Gammas), quiet) as progress:

@@ -114,10 +114,7 @@ def at_natural_curvatures(
 ) -> Iterator[tuple]:
     """Yield the points of a branch at values of kappa_n, with their equilibria; its folds are added to ``folds``.
 
-    Raises
-    ------
-    TwoBendings
-        See `ribbon_model.seeds.primary_branch`.
+    Raises TwoBendings (see `ribbon_model.seeds.primary_branch`).
     """
     try:
         start = linear.thresholds(FINITE_WIDTH, m, n, parameters)[0]
