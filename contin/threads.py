@@ -24,10 +24,7 @@ PARTS = 16
 def count() -> int:
     """Return the number of threads: ``CONTIN_THREADS``, by default the number of cores that this process may use.
 
-    Raises
-    ------
-    ProblemError
-        ``CONTIN_THREADS`` is no number of threads.
+    Raises ProblemError where ``CONTIN_THREADS`` is no number of threads.
     """
     given = os.environ.get("CONTIN_THREADS", "")
     if not given:

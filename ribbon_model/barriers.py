@@ -191,11 +191,7 @@ def folding(law: Law, m: int, kappa_n: float, parameters: float | Mapping[str, f
     With M2 as the parameter that is followed, the branch begins on the circle, C = 0; C grows with the angle between the
     points, has its largest value at a fold, and falls to zero at a state that needs no hand: an equilibrium of the free strip.
     If that is a saddle, the strip goes on by itself from there. C is dE/d(angle), so the work up to that state is the barrier.
-
-    Raises
-    ------
-    ConvergenceError
-        The circle itself is singular: kappa_n is a bifurcation.
+    Raises ConvergenceError where the circle itself is singular: kappa_n is a bifurcation.
     """
     problem = HALF_LOOP_BETWEEN_AXES.problem(law)
     values = {**problem.parameters, "kappa_n": kappa_n, **law.values(parameters)}

@@ -51,6 +51,8 @@ def with_supports(
 ) -> tuple[Collocation, np.ndarray]:  # fmt: skip
     """Return the system of a network in which ``follow`` is free, and the unknowns of a state that another one has.
 
+    Raises ValueError where the state is no equilibrium with the new supports; one sentence.
+
     Parameters
     ----------
     network : Network
@@ -62,11 +64,6 @@ def with_supports(
         Names of the loads that replace reactions; see `replacing`.
     numbers : mapping of str to float, optional
         Values that differ from those of the state, for a following correction.
-
-    Raises
-    ------
-    ValueError
-        The state is no equilibrium with the new supports; one sentence.
     """
     states, before = point.system.states(point.x), point.parameters
     values = {name: before.get(name, value) for name, value in network.parameters.items()}
@@ -125,10 +122,7 @@ def angles_near(q, near) -> tuple[float, float, float]:
 def corrected(network: Network, near: Collocation, states: np.ndarray, values: Mapping[str, float]) -> Point:
     """Return the state of a network with these numbers next to given states (K, 2n) at the nodes of a system.
 
-    Raises
-    ------
-    ConvergenceError
-        There is none nearby.
+    Raises ConvergenceError where there is none nearby.
     """
     multipliers = network.problem.multipliers
     values = fitted(network, states, dict(values), multipliers)[0]
@@ -141,10 +135,7 @@ def balanced(
 ) -> dict[str, float]:  # fmt: skip
     """Return the values with the loads and multipliers that replace the reactions.
 
-    Raises
-    ------
-    ValueError
-        A condition does not hold, or a reaction is replaced by nothing: ``unbalanced``.
+    Raises ValueError where a condition does not hold, or a reaction is replaced by nothing: ``unbalanced``.
     """
     problem = network.problem
     values, left = fitted(network, states, values, [*replacing, *problem.multipliers])

@@ -38,13 +38,7 @@ Vector = tuple[float, float, float]
 
 
 def unit(what: str, vector) -> Vector:
-    """Return a vector of length one.
-
-    Raises
-    ------
-    ValueError
-        It is no vector of three numbers, or zero.
-    """
+    """Return a vector of length one; raise ValueError where it is no vector of three numbers, or zero."""
     values = tuple(float(value) for value in vector)
     length = math.sqrt(sum(value * value for value in values))
     if len(values) != 3 or not levels.LOCATED < length < math.inf:

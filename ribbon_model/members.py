@@ -90,10 +90,7 @@ class Member:
 def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member:
     """Return a straight member between two places, whose normal d2 is as near as possible to a direction.
 
-    Raises
-    ------
-    ValueError
-        The places are one, or the normal lies along the member.
+    Raises ValueError where the places are one, or the normal lies along the member.
     """
     along = np.array(end, dtype=float) - begin
     length = float(np.linalg.norm(along))
@@ -106,10 +103,7 @@ def straight(section: str, begin: Vector, end: Vector, normal: Vector) -> Member
 def frame_along(tangent: Sequence[float], normal: Vector, what: str) -> Quaternion:
     """Return the quaternion of a frame with a tangent, a unit vector, whose normal d2 is as near as possible to a direction.
 
-    Raises
-    ------
-    ValueError
-        The normal lies along the tangent of ``what``.
+    Raises ValueError where the normal lies along the tangent of ``what``.
     """
     across = np.array(ends.unit("normal", normal)) @ (np.eye(3) - np.outer(tangent, tangent))
     if np.linalg.norm(across) < LOOSE:

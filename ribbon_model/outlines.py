@@ -41,10 +41,7 @@ _ADVICE = "so a pressure in a plane has no potential; follow follower_pressure, 
 def fans(network: Drawn) -> tuple[dict[str, Fan], list[tuple[JointEnd, str, Fan]]]:
     """Return the fan of each member; and the ends that slide, with their joint, and +1 in a fan where a row ends, else -1.
 
-    Raises
-    ------
-    ValueError
-        A pressure on the network has no potential.
+    Raises ValueError where a pressure on the network has no potential.
     """
     found: dict[str, Fan] = {}
     slides: list[tuple[JointEnd, str, Fan]] = []

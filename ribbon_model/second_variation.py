@@ -123,12 +123,8 @@ def circle(law: Law, parameters: float | Mapping[str, float], m: int, kappa_n: f
     """Return the planar m-covered circle, on a uniform mesh that resolves the highest wavenumber that can lower the energy.
 
     A wave of wavenumber l has theta ~ u / l. The moment M, along d1, contributes |M| m |K| / l^2 of the stiffness and, where
-    omega_2 is free, |M| |K| / l: above l^2 = m^2 + |M| m |K| (+ |M|^2 |K|^2) nothing is unstable.
-
-    Raises
-    ------
-    ValueError
-        The law does not give the strain omega_1 = m there: the ribbon at kappa_n >= m / nu, nu > 0.
+    omega_2 is free, |M| |K| / l: above l^2 = m^2 + |M| m |K| (+ |M|^2 |K|^2) nothing is unstable. Raises ValueError where the
+    law does not give the strain omega_1 = m there: the ribbon at kappa_n >= m / nu, nu > 0.
     """
 
     def directors(stations):
@@ -153,10 +149,7 @@ def circle(law: Law, parameters: float | Mapping[str, float], m: int, kappa_n: f
 def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
     """Return the equilibrium from the solution on a domain; arguments as for `solution.Solution`, whose method calls this.
 
-    Raises
-    ------
-    ValueError
-        On the cell: quarter waves that do not close.
+    Raises ValueError on the cell, where quarter waves do not close.
     """
     tables = basis(degree)
     mesh = np.asarray(t)[::degree]

@@ -84,10 +84,7 @@ def half_loop_branch(
 def _start(law: Law, m: int, n: int, parameters: float | Mapping[str, float], root: int) -> float:
     """Return kappa_n of the circle where a branch begins.
 
-    Raises
-    ------
-    TwoBendings
-        The law has another bending for its moment.
+    Raises TwoBendings where the law has another bending for its moment.
     """
     kappa_n = thresholds(law, m, n, parameters)[root]
     moment: float = circle(law, m, kappa_n, parameters)["M1"]

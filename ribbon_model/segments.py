@@ -324,11 +324,7 @@ def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[
     """Return a chain with its unknowns changed by (n,), and then by the least that meets conditions again.
 
     ``missed`` are the values (c,) of the conditions, which vanish where they are met, ``slopes`` their derivatives (c, n).
-
-    Raises
-    ------
-    ValueError
-        They cannot be met nearby: ``failed``.
+    Raises ValueError where they cannot be met nearby: ``failed``.
     """
     chain = chain._changed(change)
     for _ in range(levels.MOST_UPDATES):
@@ -344,10 +340,7 @@ def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[
 def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
     """Return the strip that has the strains of an equilibrium in the middle of each segment, closed.
 
-    Raises
-    ------
-    ValueError
-        It cannot be closed: too few segments.
+    Raises ValueError where it cannot be closed: too few segments.
     """
     directors = equilibrium.directors((np.arange(segments) + 0.5) * (LENGTH / segments))
     edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)

@@ -16,6 +16,10 @@ from collections.abc import Callable
 prefix = "python -m branches."
 
 
+class StoreError(Exception):
+    """A file that cannot be written or read; the message is one sentence."""
+
+
 def typed(command: str) -> str:
     """Return how a command is typed: as the present one, ``ribbon run`` or ``python -m branches.run``."""
     return f"{prefix}{command}"
@@ -90,7 +94,6 @@ def answered(*more: type[Exception]) -> Callable[[Callable], Callable[..., int]]
                 return main(argv)
             except Exception as error:
                 from branches.scene.fields import ConfigError  # these take .1 s, and are needed here only
-                from branches.store.files import StoreError
                 from contin import ContinError
 
                 if not isinstance(error, (ConfigError, StoreError, ContinError, *more)):

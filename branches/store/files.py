@@ -14,15 +14,11 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from branches.store import interrupt
-from branches.store.command import typed
+from branches.store.command import StoreError, typed
 from contin.lowlevel import meant, temporary_name, write_whole
 
 #: Bytes of the smallest result; as many are written to test the disk before a computation.
 _SMALLEST = 64 * 1024
-
-
-class StoreError(Exception):
-    """A file that cannot be written or read; the message is one sentence."""
 
 
 #: What can be done where a folder holds another diagram.

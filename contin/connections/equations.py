@@ -131,10 +131,7 @@ class ConnectionCollocation(Collocation):
     def _linear_at_ends(self, p: Array) -> list[_Linear]:
         """Return the linearized fields at both equilibria, once for values of all parameters.
 
-        Raises
-        ------
-        ConvergenceError
-            A Jacobian is not finite.
+        Raises ConvergenceError where a Jacobian is not finite.
         """
 
         def made(place: Array) -> _Linear:
@@ -467,12 +464,7 @@ class ConnectionCollocation(Collocation):
         return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
 
     def check_solution(self, x: Array) -> None:
-        """Check that an orbit between two equilibria does not return to the first one.
-
-        Raises
-        ------
-        ProblemError
-        """
+        """Check that an orbit between two equilibria does not return to the first one; raise ProblemError otherwise."""
         problem = self.problem
         if problem.homoclinic:
             return
@@ -539,10 +531,7 @@ def _schur(matrix: Array) -> _Schur:
 def _left_subspace(transposed: _Schur, count: int, stable: bool) -> Array:
     """Return a basis (count, n) of the left eigenvectors with the ``count`` least (stable) or largest real parts.
 
-    Raises
-    ------
-    ConvergenceError
-        The equilibrium has not so many.
+    Raises ConvergenceError where the equilibrium has not so many.
     """
     from scipy.linalg.lapack import dtrsen
 
@@ -575,10 +564,7 @@ def _sylvester(a: Array, b: Array) -> Callable[[Array], Array]:
 def _normalized(left: Array, basis: Array) -> Array:
     """Return the basis L of the space of ``left`` with L Q^T = I, for the basis Q of a space near by.
 
-    Raises
-    ------
-    ConvergenceError
-        A direction of one space is orthogonal to the other one: L has no finite entries.
+    Raises ConvergenceError where a direction of one space is orthogonal to the other one: L has no finite entries.
     """
     try:
         return np.asarray(np.linalg.solve(left @ basis.T, left), dtype=float)

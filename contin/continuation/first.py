@@ -38,10 +38,7 @@ def on_branch(system: Discretization, x: Array, tangent: Array, settings: Settin
 def corrected_first(system: Discretization, x: Array, settings: Settings, primary: str) -> State:
     """Return the state at the point that Newton's method finds from x, on a mesh on which its error is within the tolerance.
 
-    Raises
-    ------
-    ConvergenceError
-        Newton's method fails.
+    Raises ConvergenceError where Newton's method fails.
     """
     for _ in range(ROUNDS_OF_MESHES):
         system, x, row = _on_switches(system, x, settings, primary)

@@ -208,11 +208,8 @@ class MeshPolicy:
         """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
 
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
-        it is looked at closely: that takes longer than to make it. ``made`` is its end, where a kernel has it.
-
-        Raises
-        ------
-        ConvergenceError
+        it is looked at closely: that takes longer than to make it. ``made`` is its end, where a kernel has it. Raises
+        ConvergenceError.
         """
         control = self.steps.settings.mesh
         arc, judgement = self.steps.attempt(run.state, run.here(), step, made)

@@ -21,17 +21,12 @@ _FIRST, _BETWEEN = 1.0, 0.2
 
 
 class Progress:
-    """The line of progress of one call.
+    """The line of progress of one call; raise ProblemError where ``wanted`` is none of these.
 
     Parameters
     ----------
     wanted : bool or None
         Whether to show it; None shows it where standard error is a terminal.
-
-    Raises
-    ------
-    ProblemError
-        ``wanted`` is none of these.
     """
 
     def __init__(self, wanted: bool | None) -> None:
@@ -73,12 +68,8 @@ class Progress:
 def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
     """Run to the end, or to the first Ctrl-C, and return the branch.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        Ctrl-C before the first point.
-    ProblemError
-        The run starts outside its limits, which leaves it with its first point.
+    Raises KeyboardInterrupt at Ctrl-C before the first point; ProblemError where the run starts outside its limits, which
+    leaves it with its first point.
     """
     branch = Branch()
     try:

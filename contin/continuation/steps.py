@@ -69,11 +69,7 @@ class Steps:
     def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Arc, Judgement]:
         """Make one step of a given length from the state's point, as far as it can be believed by itself.
 
-        ``made`` is its end, where a kernel has it.
-
-        Raises
-        ------
-        ConvergenceError
+        ``made`` is its end, where a kernel has it. Raises ConvergenceError where there is none.
         """
         settings = self.settings
         guess = predict(state, step, settings)

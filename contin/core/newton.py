@@ -154,11 +154,7 @@ def _in_one_call(
 ) -> Corrected | None:
     """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given; the guess without newton.
 
-    None where Python must decide whether updates are round-off.
-
-    Raises
-    ------
-    ConvergenceError
+    None where Python must decide whether updates are round-off. Raises ConvergenceError where they do not converge.
     """
     values = work.values
     if (row is None) != (system.size == system.equations):
@@ -229,12 +225,8 @@ def _settled(
     """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
     An unknown that is zero has no size: its updates vanish much faster than they become small. What is left of it is round-off
-    of the iterate before. An update that is round-off is not made: where the matrix is nearly singular, it leads away.
-
-    Raises
-    ------
-    ConvergenceError
-        It does not become so; the message holds the last updates, relative to these sizes.
+    of the iterate before. An update that is round-off is not made: where the matrix is nearly singular, it leads away. Raises
+    ConvergenceError where it does not become so; the message holds the last updates, relative to these sizes.
     """
     rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
     noise = np.zeros_like(x)
@@ -360,13 +352,7 @@ def _chords(
     newton: Newton,
     factors: Factors,
 ) -> Corrected:
-    """Chord steps with factors from elsewhere, for a guess that is close.
-
-    Raises
-    ------
-    ConvergenceError
-        They converge slowly.
-    """
+    """Chord steps with factors from elsewhere, for a guess that is close; raise ConvergenceError where they converge slowly."""
     x = np.array(guess, dtype=float)
     sizes: list[float] = []
     with np.errstate(all="ignore"):

@@ -221,12 +221,7 @@ class Discretization(Equations, Protocol):
         return None
 
     def check_solution(self, x: Array) -> None:
-        """Check that a solution is one of the kind that was asked for.
-
-        Raises
-        ------
-        ProblemError
-        """
+        """Check that a solution is one of the kind that was asked for; raise ProblemError otherwise."""
         return
 
     def degenerate(self, x: Array) -> str:

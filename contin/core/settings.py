@@ -126,9 +126,7 @@ class Settings:
 def check(system: Discretization, settings: Settings) -> None:
     """Refuse settings that name what a problem does not have, and a system with too many or too few free parameters.
 
-    Raises
-    ------
-    ProblemError
+    Raises ProblemError otherwise.
     """
     threads.count()  # refuses a wrong number, also where the problem is too small to use it
     if len(system.free) != system.problem.free_size:
@@ -173,13 +171,7 @@ class Options(TypedDict, total=False):
 
 
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
-    """Return the settings with some fields changed.
-
-    Raises
-    ------
-    ProblemError
-        An unknown field, or a value that it cannot have.
-    """
+    """Return the settings with some fields changed; raise ProblemError for an unknown field, or a value that it cannot have."""
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
     known = [entry.name for entry in dataclasses.fields(Settings) if entry.name not in _FIRST_NAMES]
     options = _by_new_name(options)

@@ -164,10 +164,7 @@ CLEAR = 1e-6
 def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     """Return the point of the curve at ``step`` along the state's tangent, linearized right there.
 
-    Raises
-    ------
-    ConvergenceError
-        It is not found, or the equations are not finite there.
+    Raises ConvergenceError where it is not found, or the equations are not finite there.
     """
     row = state.row
     small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
@@ -180,10 +177,7 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
     """Return the trial of a corrected point, linearized right there: Newton's last factors are those of an iterate before.
 
-    Raises
-    ------
-    ConvergenceError
-        The equations are not finite there.
+    Raises ConvergenceError where the equations are not finite there.
     """
     if done.tangent is not None:
         linear = Linearization(done.tangent, done.factors.sign, done.factors)
@@ -197,11 +191,7 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
     """Return the point of the curve at ``step``, linearized right there: when that is first asked for, if it takes long.
 
-    ``factors`` from near by save Newton's method its own.
-
-    Raises
-    ------
-    ConvergenceError
+    ``factors`` from near by save Newton's method its own. Raises ConvergenceError where there is none.
     """
     row = state.row
     small = corrected_small(state.system, guess, row, row @ state.x + step, newton)

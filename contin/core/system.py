@@ -143,6 +143,8 @@ class Term(NamedTuple):
 class System(Discretization):
     """A problem with chosen free parameters; ``x`` holds the states, flattened, then the free parameters.
 
+    Raises ProblemError for an unknown parameter.
+
     Attributes
     ----------
     problem : Statement
@@ -152,11 +154,6 @@ class System(Discretization):
         Values of all parameters; those of the free ones are not used.
     state_size : int
         Where the free parameters begin in x; set by the kinds of system.
-
-    Raises
-    ------
-    ProblemError
-        An unknown parameter.
     """
 
     parameters: Array

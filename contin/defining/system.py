@@ -63,6 +63,8 @@ def _of_the_base(name: str) -> Any:
 class Defining(Discretization):
     """A defining system: names and columns are those of the underlying system ``base``.
 
+    Raises ProblemError where the problem has a column of such a name.
+
     Parameters
     ----------
     base : System
@@ -78,11 +80,6 @@ class Defining(Discretization):
         k and the number of unknowns z.
     own_columns : tuple of str
         Names of columns beyond those of ``base``.
-
-    Raises
-    ------
-    ProblemError
-        The problem has a column of such a name.
     """
 
     kind = ""

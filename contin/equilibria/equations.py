@@ -55,10 +55,7 @@ class _Given(Protocol):
 def check_given(problem: _Given, u: Array, p: Array) -> None:
     """Compare a given Jacobian with differences of the residual along a random direction, the first time.
 
-    Raises
-    ------
-    ProblemError
-        An entry is wrong; the message names it.
+    Raises ProblemError where an entry is wrong; the message names it.
     """
     if problem.jacobian is None or problem.compared:
         return

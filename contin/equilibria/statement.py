@@ -339,10 +339,7 @@ class ReducedProblem(AlgebraicProblem):
     def check_totals(self, u: Array, p: Array) -> None:
         """Check that the states that follow are at rest, too: elsewhere a condition may have switched.
 
-        Raises
-        ------
-        ProblemError
-            One is not: its total is not conserved there.
+        Raises ProblemError where one is not: its total is not conserved there.
         """
         states = self._states(u, p[len(self.whole.parameters) :])
         system = self.whole.discretized((), dict(zip(self.whole.parameters, map(float, p))))

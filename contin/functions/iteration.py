@@ -301,10 +301,7 @@ def recorded_search(
 ) -> tuple[Search, list[Number]]:
     """Return the search for unknowns on a tape, and the numbers that its equations read.
 
-    Raises
-    ------
-    Unrecordable
-        A search within a search.
+    Raises Unrecordable for a search within a search.
     """
     k = len(starts)
     unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
@@ -341,10 +338,7 @@ def search_of(tape: Tape, unknowns: Sequence[int], values: Sequence[int], starts
 def operands_of(tape: Tape, search: Search) -> list[Number]:
     """Return what the equations of a search read besides its unknowns, and the starts.
 
-    Raises
-    ------
-    Unrecordable
-        A search within a search.
+    Raises Unrecordable for a search within a search.
     """
     depends = tape.reading(search.results, search.unknowns)
     operands: dict[int, None] = {}

@@ -191,13 +191,7 @@ UFUNCS |= {
 
 
 def ufunc_of_numbers(ufunc: np.ufunc, method: str, inputs: Sequence[object], options: dict[str, Any]) -> Any:
-    """Return a universal function of recorded numbers.
-
-    Raises
-    ------
-    Unrecordable
-        A function that the tape does not know.
-    """
+    """Return a universal function of recorded numbers; raise Unrecordable for a function that the tape does not know."""
     name = ufunc.__name__
     if name in ("matmul", "vecdot") and method == "__call__":
         return _stored(matrix_product(*inputs), **options)

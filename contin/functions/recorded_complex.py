@@ -37,10 +37,7 @@ def part(value: Any, name: str) -> Any:
 def function_of_complex(name: str, value: Any) -> Any:
     """Return a function of a complex number, recorded or not.
 
-    Raises
-    ------
-    Unrecordable
-        The operation of this name has no rule for it.
+    Raises Unrecordable where the operation of this name has no rule for it.
     """
     pair = TABLE[name].pair
     if pair is None:

@@ -79,12 +79,7 @@ def sized(recording: Recording) -> Recording:
 
 
 def record(functions: Sequence[UserFunction], signature: Signature, tape: Tape | None = None) -> Recording:
-    """Return the recording of functions, on a new tape or on an empty one.
-
-    Raises
-    ------
-    Unrecordable
-    """
+    """Return the recording of functions, on a new tape or on an empty one; raise Unrecordable where that fails."""
     tape = tape or Tape(NUMPY)
     time = tape.input(TIME)
     inputs = [tape.input(slot) for slot in range(signature.inputs)]
@@ -103,12 +98,7 @@ def _given(signature: Signature, time: object, inputs: Sequence[Any]) -> list[An
 
 
 def checked(functions: Sequence[UserFunction], signature: Signature) -> Recording:
-    """Return the recording, made twice and compared with values in Python.
-
-    Raises
-    ------
-    Unrecordable
-    """
+    """Return the recording, made twice and compared with values in Python; raise Unrecordable where that fails."""
     found = record(functions, signature)
     if not record(functions, signature).same(found):
         raise Unrecordable("it is not the same when it is called again")
@@ -120,16 +110,12 @@ def checked(functions: Sequence[UserFunction], signature: Signature) -> Recordin
 
 
 def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequence[Any]]) -> list[int]:
-    """Return the places of a function's values, joined over all outcomes of its decisions.
+    """Return the places of a function's values, joined over all outcomes of its decisions; raise Unrecordable where that fails.
 
     Parameters
     ----------
     call : callable
         ``call(copy)`` calls a copy of the function that takes recorded numbers, and returns its values.
-
-    Raises
-    ------
-    Unrecordable
     """
     paths, before = _Paths(tape, functools.partial(call, prepared(function)), tape.searches), tape.decide
     try:
@@ -194,12 +180,7 @@ class _Paths:
     def one_by_one(self) -> list[int]:
         """Return the places of the values with selections where the other outcome of one decision makes a difference.
 
-        They are compared with paths of random outcomes.
-
-        Raises
-        ------
-        _ManyPaths
-            Decisions are not independent.
+        They are compared with paths of random outcomes. Raises _ManyPaths where decisions are not independent.
         """
         first, others, done = self.taken([], {}), dict[int, list[int]](), dict[Any, int]()
         conditions = [condition for condition, _ in first.taken]
@@ -319,10 +300,7 @@ def _sentence(error: Exception) -> str:
 def _compare(function: UserFunction, signature: Signature, recording: Recording, places: Sequence[int]) -> None:
     """Compare values of the tape with those of Python, at a few places where Python has some.
 
-    Raises
-    ------
-    Unrecordable
-        They differ.
+    Raises Unrecordable where they differ.
     """
     random = draws.generator("recording")
     for center in PROBES[:3]:
@@ -344,10 +322,8 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
 def result_count(function: Function, arguments: Arguments, what: str) -> int:
     """Return how many values a function returns (0: a bare number), from calls in Python with numbers, or from a recording.
 
-    Raises
-    ------
-    ProblemError
-        The call fails, for each of some numbers, with named tuples and with arrays; ``what`` names the function.
+    Raises ProblemError where the call fails, for each of some numbers, with named tuples and with arrays; ``what`` names the
+    function.
     """
     errors: list[Exception] = []
     for arrays in (False, True):
@@ -371,17 +347,13 @@ def result_count(function: Function, arguments: Arguments, what: str) -> int:
 
 
 def function_of(function: Function, arguments: Arguments) -> RecordedFunction:
-    """Return a user's function as a recording, which can be pickled and compared.
+    """Return a user's function as a recording, which can be pickled and compared; raise Unrecordable where that fails.
 
     Parameters
     ----------
     arguments : sequence of tuple of str, list of them, or None
         Names of the components of each argument; None for a number, a list for a tuple of named tuples. A function that fills
         an array fills one like the first of them with names.
-
-    Raises
-    ------
-    Unrecordable
     """
     tape, single = Tape(NUMPY), True
     inputs = [tape.input(("argument", number)) for number in range(component_count(list(arguments)))]

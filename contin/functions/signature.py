@@ -132,10 +132,7 @@ def component_count(names: Any) -> int:
 def argument_count(function: Function) -> int:
     """Return the number of arguments of a user's function that have no default.
 
-    Raises
-    ------
-    ProblemError
-        It is no function, or one that does not say.
+    Raises ProblemError where it is no function, or one that does not say.
     """
     try:
         given = inspect.signature(getattr(function, "py_func", function)).parameters.values()

@@ -131,10 +131,7 @@ def _flat(argument: object) -> list[Any]:
 def prepared(function: object) -> Any:
     """Return a copy of a function that takes recorded numbers.
 
-    Raises
-    ------
-    Unrecordable
-        It is no plain Python function, or one that catches exceptions.
+    Raises Unrecordable where it is no plain Python function, or one that catches exceptions.
     """
     return _Copies().function(function)
 

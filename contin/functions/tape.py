@@ -101,13 +101,7 @@ class Tape:
         return operation.data if operation.name == "constant" else None
 
     def number(self, value: object) -> Number:
-        """Return a Number for one of this tape or a real number.
-
-        Raises
-        ------
-        Unrecordable
-            It is neither.
-        """
+        """Return a Number for one of this tape or a real number; raise Unrecordable where it is neither."""
         if isinstance(value, Number):
             if value.tape is not self:
                 raise Unrecordable("it uses a number of another recording")

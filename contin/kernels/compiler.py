@@ -59,12 +59,8 @@ _CONTIGUOUS, _WRITABLE = 0x0001 | 0x0100, 0x0400
 def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Code:
     """Return the machine code of a kernel, as `contin.kernels.kernel.kernel` describes it, with the name of its entry.
 
-    Raises
-    ------
-    TypeError
-        An annotation that is no type of a kernel's argument; or it calls a function of numba.
-    numba.core.errors.NumbaError
-        It cannot be compiled.
+    Raises TypeError for an annotation that is no type of a kernel's argument, or a call of a function of numba;
+    numba.core.errors.NumbaError where it cannot be compiled.
     """
     result, parameters = _signature(function)
     hints = list(get_type_hints(function, include_extras=True).values())[:-1]

@@ -91,12 +91,7 @@ def machine() -> tuple[str, str]:
 
     The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3
     (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one elsewhere.
-    ``CONTIN_PROCESSOR`` names another one.
-
-    Raises
-    ------
-    ContinError
-        It names none of these three.
+    ``CONTIN_PROCESSOR`` names another one. Raises ContinError where it names none of these three.
     """
     kind, given = platform.machine().lower(), os.environ.get("CONTIN_PROCESSOR", "")
     if given and given not in _PROCESSORS:
@@ -203,13 +198,7 @@ def claim(key: str) -> Iterator[bool]:
 
 
 def _unpacked(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the head and the object code of a file.
-
-    Raises
-    ------
-    ValueError
-        The file is not whole.
-    """
+    """Return the head and the object code of a file; raise ValueError where the file is not whole."""
     body = memoryview(data)[32:]
     if hashlib.sha256(body).digest() != data[:32]:
         raise ValueError("the file is not whole")
@@ -232,10 +221,7 @@ _KEPT: list[_Method] = []
 def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
     """Return machine code as a Python function; ``name`` is that of its module and its own.
 
-    Raises
-    ------
-    ContinError
-        It calls a function that this process does not have.
+    Raises ContinError where it calls a function that this process does not have.
     """
     engine = _engine()
     missing = _missing(code, kernels=True)

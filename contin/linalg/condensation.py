@@ -507,7 +507,7 @@ class Factorization:
     """A factored bordered almost-block-diagonal matrix: solves, transposed solves, sign of the determinant.
 
     Vectors of unknowns are [mesh and interior values in order | parameters]; vectors of equations are
-    [collocation | boundary | border rows].
+    [collocation | boundary | border rows]. Raises ValueError if the matrix is not square.
 
     Parameters
     ----------
@@ -517,11 +517,6 @@ class Factorization:
         The matrix; ``local``, ``border`` and ``corner`` are overwritten.
     whole : Share, optional
         Its segments; by default as many as suit its size.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not square.
     """
 
     def __repr__(self) -> str:

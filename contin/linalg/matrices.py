@@ -34,12 +34,8 @@ def _lapack() -> Any:
 def eigenvalues(matrix: Array) -> ComplexArray:
     """Return the eigenvalues of a real matrix, complex; NaN where it is not finite, as outside the domain of the equations.
 
-    Several matrices, shape (..., n, n), have one row of eigenvalues each, all NaN where one of them is not finite.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        They are not found, of a large matrix; they are NaN of a small one then.
+    Several matrices, shape (..., n, n), have one row of eigenvalues each, all NaN where one of them is not finite. Raises
+    numpy.linalg.LinAlgError where they are not found, of a large matrix; they are NaN of a small one then.
 
     Examples
     --------
@@ -60,14 +56,11 @@ def eigenvalues(matrix: Array) -> ComplexArray:
 class DenseFactors:
     """LU of a dense matrix, real or complex, with partial pivoting: `Factors` of small systems.
 
+    Raises ValueError if the matrix is not square.
+
     Parameters
     ----------
     matrix : ndarray, shape (n, n)
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not square.
 
     Examples
     --------
@@ -141,6 +134,8 @@ _BORDER = 2.0**-30
 class SparseFactors:
     """LU of a sparse matrix, real or complex: `Factors` of large systems without a mesh.
 
+    Raises ValueError if the matrix is not square.
+
     Parameters
     ----------
     matrix : scipy.sparse array, shape (n, n)
@@ -148,11 +143,6 @@ class SparseFactors:
         So many rows at the end are dense.
     solver : callable, optional
         Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not square.
 
     Examples
     --------

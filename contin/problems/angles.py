@@ -33,10 +33,7 @@ class Angular(Protocol):
 def angle_periods(angles: Angles, states: Sequence[str]) -> dict[str, float]:
     """Return the period of each angle by its name.
 
-    Raises
-    ------
-    ProblemError
-        One is no state, or its period is no positive number.
+    Raises ProblemError where one is no state, or its period is no positive number.
 
     Examples
     --------
@@ -80,12 +77,7 @@ def windings(angles: Mapping[str, float], states: Sequence[str], gained: Array) 
 
 
 def check_windings(angles: Mapping[str, float], free: Sequence[str], parameters: Mapping[str, float]) -> None:
-    """Check that all numbers of rounds are whole, and that none is free.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Check that all numbers of rounds are whole, and that none is free; raise ProblemError otherwise."""
     for name in winding_names(angles):
         if name in free:
             raise ProblemError(f"free: {name} must not be free, as it is a whole number")
@@ -98,11 +90,7 @@ def check_periodic(
 ) -> None:
     """Check at some places that a function of the states is periodic in each angle; where it has no value nothing is checked.
 
-    A map (``lifts``) may gain whole rounds of the angles that it returns.
-
-    Raises
-    ------
-    ProblemError
+    A map (``lifts``) may gain whole rounds of the angles that it returns. Raises ProblemError otherwise.
     """
     names, random = batch.signature.states, generator("angles")
     u = random.uniform(-1, 1, (PLACES, len(names)))

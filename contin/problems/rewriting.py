@@ -79,9 +79,7 @@ def _unpacks(field: Function, signature: Signature) -> bool:
 def check_field(field: Function, signature: Signature, wrong: str) -> None:
     """Check that a field takes these arguments and returns a value for each state; ``wrong`` is said of other arguments.
 
-    Raises
-    ------
-    ProblemError
+    Raises ProblemError otherwise.
     """
     if argument_count(checks.function("field", field)) != len(signature.arguments):
         raise ProblemError(f"field: {wrong}")
@@ -95,10 +93,7 @@ def of_parameters(
 ) -> Function:
     """Return a number, parameter or function of the parameters as a function of these; ``what`` names it in messages.
 
-    Raises
-    ------
-    ProblemError
-        It is none of these, or a number that is not positive where it must be.
+    Raises ProblemError where it is none of these, or a number that is not positive where it must be.
     """
     if isinstance(value, str):
         if value not in parameters:
@@ -170,10 +165,7 @@ class Mass:
     def of(cls, mass: Any, names: Sequence[str]) -> Mass:
         """Return a matrix, or its diagonal, analysed.
 
-        Raises
-        ------
-        ProblemError
-            It is neither, or too many states have no rates.
+        Raises ProblemError where it is neither, or too many states have no rates.
         """
         n = len(names)
         given = mass.toarray() if hasattr(mass, "toarray") else mass
@@ -254,10 +246,7 @@ class Mass:
     def check_index(self, jacobian: Array, names: Sequence[str]) -> None:
         """Check that z is determined at a place, by F_u there (n, n).
 
-        Raises
-        ------
-        ProblemError
-            The derivative of L2 F by z is singular.
+        Raises ProblemError where the derivative of L2 F by z is singular.
         """
         by_found = jacobian[:, self.found] - jacobian[:, self.kept] @ np.reshape(self.others, (len(self.kept), -1))
         by_found = np.array(self.algebraic) @ by_found

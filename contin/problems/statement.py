@@ -253,9 +253,7 @@ def check_statement(
 ) -> tuple[str, ...]:
     """Check names and values of a problem, and return the names of its states (u0, u1, ... for a number of states, ``most``).
 
-    Raises
-    ------
-    ProblemError
+    Raises ProblemError otherwise.
     """
     if isinstance(states, (int, np.integer)):
         checks.whole("states", states, 1, most)
@@ -274,13 +272,7 @@ def check_statement(
 
 
 def _usable(kind: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Return names as a tuple.
-
-    Raises
-    ------
-    ProblemError
-        One cannot be a field of a named tuple, or stands twice.
-    """
+    """Return names as a tuple; raise ProblemError where one cannot be a field of a named tuple, or stands twice."""
     names = tuple(checks.sequence(kind, names, "names"))
     for name in names:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
@@ -304,10 +296,7 @@ TIME = "time"
 def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
     """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
 
-    Raises
-    ------
-    ProblemError
-        It is no whole number, or free.
+    Raises ProblemError where it is no whole number, or free.
     """
     rounds = parameters[ROUNDS]
     if ROUNDS in free:

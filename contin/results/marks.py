@@ -19,10 +19,7 @@ else:
 def new_axes(count: int = 1) -> Any:
     """Return the axes of a new figure: one, or an array of some, side by side.
 
-    Raises
-    ------
-    ImportError
-        matplotlib is not installed.
+    Raises ImportError where matplotlib is not installed.
     """
     try:
         from matplotlib import pyplot

@@ -87,10 +87,7 @@ def column(points: Sequence[Point], name: str) -> Array:
 def value(point: Point | Trial, name: str) -> float:
     """Return a parameter, a functional, a state of equilibria, its largest or smallest value, or the norm.
 
-    Raises
-    ------
-    KeyError
-        There is none of this name.
+    Raises KeyError where there is none of this name.
     """
     system = point.system
     states, extreme = system.named_states, name[:3]
@@ -363,10 +360,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
 def check_column(points: Sequence[Point], argument: str, name: str, further: Sequence[str] = ()) -> None:
     """Check that a name is that of a column; ``further`` are listed with the columns where it is not.
 
-    Raises
-    ------
-    ProblemError
-        There are no points, or there is no such column.
+    Raises ProblemError where there are no points, or there is no such column.
     """
     if not points:
         raise ProblemError("the branch has no points to draw")

@@ -62,10 +62,7 @@ class Record:
 def system_of(point: Record, what: str) -> System:
     """Return the system of a point, where other parameters of its problem may become free.
 
-    Raises
-    ------
-    ProblemError
-        A point of a curve in two parameters; ``what`` names the argument.
+    Raises ProblemError for a point of a curve in two parameters; ``what`` names the argument.
     """
     system: Any = point.system
     if system.on_curve:
@@ -76,10 +73,7 @@ def system_of(point: Record, what: str) -> System:
 def over_t(point: Record, otherwise: str) -> Collocation:
     """Return the system of a solution over t.
 
-    Raises
-    ------
-    ProblemError
-        It is no function of t; the sentence says ``otherwise``.
+    Raises ProblemError where it is no function of t; the sentence says ``otherwise``.
     """
     system: Any = point.system
     if not system.is_function_of_t:

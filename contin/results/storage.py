@@ -227,12 +227,7 @@ def _contents(
 ) -> tuple[list[Result], list[dict[str, Any]] | None]:
     """Return ``make(head, arrays)`` of each branch in a file of `save`, and the junctions of a diagram.
 
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    ProblemError
-        It is no branch, or ``make`` fails.
+    Raises OSError where the file cannot be read; ProblemError where it is no branch, or ``make`` fails.
     """
     with open(path, "rb"):
         pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds

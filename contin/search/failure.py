@@ -72,12 +72,8 @@ def recovered(system: System, x: Array, newton: Newton, singular: bool) -> Corre
 def _through_corners(system: Algebraic, x: Array, newton: Newton) -> Corrected | None:
     """Return the solution to which F(x) = (1 - t) F(x0) leads from the guess x0, through corners on the way; or None.
 
-    Newton's method, with the outcomes of each iterate, may go round and round between them (Katzenelson 1965).
-
-    Raises
-    ------
-    ProblemError
-        The equations jump on the way.
+    Newton's method, with the outcomes of each iterate, may go round and round between them (Katzenelson 1965). Raises
+    ProblemError where the equations jump on the way.
     """
     problem, names, t = system.problem, system.problem.state_names, "part_of_the_way_"
     if not np.isfinite(system.residual(x)).all():

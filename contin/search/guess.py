@@ -29,10 +29,7 @@ _MOST_INTERVALS = 20
 def with_guessed_multipliers(system: Collocation, states: Array) -> Array:
     """Return a vector of unknowns from states (K, n) at the nodes: with the multipliers that fit them best.
 
-    Raises
-    ------
-    ProblemError
-        The energy has no finite value there.
+    Raises ProblemError where the energy has no finite value there.
     """
     if system.intervals > _MOST_INTERVALS:
         a, b = system.problem.domain
@@ -194,10 +191,7 @@ class Parsed(NamedTuple):
 def parsed(problem: Any, guess: Guess, parameters: Mapping[str, float]) -> Parsed:
     """Return a guess of any form as states over t; without one those of a problem without t are zeros.
 
-    Raises
-    ------
-    ProblemError
-        There is none, it is not numbers, or arrays have another size or domain.
+    Raises ProblemError where there is none, it is not numbers, or arrays have another size or domain.
     """
     begin = np.array(problem.domain or (0.0,))[:1]
     if isinstance(guess, Point):
@@ -250,12 +244,8 @@ def _of_arrays(problem: Any, t: Array, states: Array) -> Parsed:
 def restated(problem: Any, guess: Guess, parameters: dict[str, float]) -> tuple[Any, Parsed, dict[str, float]]:
     """Return a problem without states that follow from others, the guess for it, and the parameters.
 
-    These are states without rates, and those that follow from conserved totals, which are then among the parameters.
-
-    Raises
-    ------
-    ProblemError
-        A guess that does not fit; states without rates are not determined there; totals are given nowhere.
+    These are states without rates, and those that follow from conserved totals, which are then among the parameters. Raises
+    ProblemError for a guess that does not fit, or does not determine states without rates, or gives no totals.
     """
     given, mass, names = parsed(problem, guess, parameters), problem.mass, problem.state_names
     parameters, point = {**given.told, **parameters}, given.point
@@ -287,10 +277,7 @@ def first_guess(
 ) -> tuple[System, Array]:  # fmt: skip
     """Return the discretized problem and a vector of unknowns for a guess.
 
-    Raises
-    ------
-    ProblemError
-        A guess that does not fit.
+    Raises ProblemError for a guess that does not fit.
     """
     values, count, point = {**problem.parameters, **parameters}, len(problem.state_names), guess.point
     if isinstance(problem, AlgebraicProblem):

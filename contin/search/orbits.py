@@ -102,10 +102,7 @@ class GrownOrbit:
 class _Saddle:
     """The saddle of a point, and the single unstable or stable direction that orbits are grown along.
 
-    Raises
-    ------
-    ProblemError
-        It has none.
+    Raises ProblemError where it has none.
     """
 
     def __init__(self, point: Point, name: str) -> None:
@@ -135,10 +132,7 @@ class _Saddle:
     def at(self, value: float, guess: Array) -> tuple[Array, Array, Array, float]:
         """Return the saddle at a value of the parameter, q and p with p.q = 1, and the eigenvalue.
 
-        Raises
-        ------
-        ConvergenceError
-            It is not found.
+        Raises ConvergenceError where it is not found.
         """
         system = self._algebraic({**self.values, self.name: value})
         rest = nearest_zero(lambda u: (system.residual(u), system.jacobian(u)), guess)
@@ -160,12 +154,8 @@ def grown_orbit(start: Point, name: str, interval: tuple[float, float], directio
     """Return an orbit that comes back to the saddle ``start`` for some value of a parameter, and the number of unstable
     eigenvalues.
 
-    Raises
-    ------
-    ProblemError
-        The start is no saddle with a single unstable or stable eigenvalue.
-    ConvergenceError
-        No value in the interval has such an orbit.
+    Raises ProblemError where the start is no saddle with a single unstable or stable eigenvalue; ConvergenceError where no
+    value in the interval has such an orbit.
     """
     saddle = _Saddle(start, name)
     for first, second in _neighbours(saddle, interval, direction):

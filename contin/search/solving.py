@@ -42,13 +42,7 @@ _STARTS = [(m, longest) for longest in (3.0, 1.0, 0.3) for m in (1.0, -1.0, 5.0,
 
 
 def correct_away(system: Discretization, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
-    """Return a solution near x that is none of the ``others``.
-
-    Raises
-    ------
-    ConvergenceError
-        None was found.
-    """
+    """Return a solution near x that is none of the ``others``; raise ConvergenceError where none was found."""
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
     known = [system.lifted(np.append(states, x[system.state_size :]), x) for states in known]
     nearest = known[first_least([inner(system, x - root, x - root) for root in known])]

@@ -58,14 +58,8 @@ def switched(
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
 
     Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free. The
-    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more.
-
-    Raises
-    ------
-    ProblemError
-        None begin there.
-    ConvergenceError
-        The branch point of doubled orbits is not found.
+    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more. Raises ProblemError where none begin there;
+    ConvergenceError where the branch point of doubled orbits is not found.
     """
     cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point, max(fewest, _INTERVALS))
     if free is None:
@@ -79,11 +73,7 @@ def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Ar
     """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
 
     The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
-
-    Raises
-    ------
-    ProblemError
-        It is no Hopf point of equilibria.
+    Raises ProblemError where it is no Hopf point of equilibria.
     """
     system: Any = point.system
     if point.label != Label.HOPF or system.is_cycle or not system.starts_cycles:
@@ -137,14 +127,8 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
 
     The orbit, traversed twice, is a branch point of that system; the new branch leaves along perturbations that change their
     sign from one round to the next. With a symmetry S a round is one n-th of the period, the new orbits have the symmetry S^2
-    and, if n is even, about the same period.
-
-    Raises
-    ------
-    ProblemError
-        It is no period-doubling point.
-    ConvergenceError
-        The branch point is not found.
+    and, if n is even, about the same period. Raises ProblemError where it is no period-doubling point; ConvergenceError where
+    the branch point is not found.
     """
     system: Any = point.system
     if not doubles(point):
@@ -196,12 +180,7 @@ def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]
 
     From a curve of orbits to a saddle it is that of central orbits to the saddle-node, and the other way round. The orbit
     solves the equations of both: its component along the eigenvector is zero at one end. The tangent leads to central orbits,
-    or to those of a saddle.
-
-    Raises
-    ------
-    ProblemError
-        The curve has other than two free parameters.
+    or to those of a saddle. Raises ProblemError where the curve has other than two free parameters.
     """
     system: Any = point.system
     old = system.problem

@@ -69,18 +69,13 @@ _HALF = 7.0
 
 
 class Takens:
-    """The normal form of a Bogdanov-Takens point.
+    """The normal form of a Bogdanov-Takens point; raise ProblemError where the normal form is degenerate.
 
     Parameters
     ----------
     base : Algebraic
         In the user's units, with two free parameters.
     x : ndarray, shape (size,)
-
-    Raises
-    ------
-    ProblemError
-        The normal form is degenerate.
     """
 
     def __init__(self, base: Algebraic, x: Array) -> None:
@@ -195,12 +190,7 @@ First = tuple[Discretization, Array, Array | None]
 def leaving(start: Point, kind: str, branch: int) -> First:
     """Return where a curve begins that leaves from a point of codimension two.
 
-    Raises
-    ------
-    ProblemError
-        No such curve leaves there.
-    ConvergenceError
-        It is not found.
+    Raises ProblemError where no such curve leaves there; ConvergenceError where it is not found.
     """
     if kind not in start.curves:
         known = f"labelled {start.label!r}: {', '.join(start.curves) or 'none'}"
