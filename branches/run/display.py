@@ -266,7 +266,6 @@ class StartingDisplay(Display):
         super().note(text)
 
     def clear(self) -> None:
-        """Take the moving line away."""
         self._start.stop()
         super().clear()
 

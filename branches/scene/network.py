@@ -281,7 +281,6 @@ class NetworkScene(StagedScene):
             raise ConfigError(f"strips: no first state was found from the drawing: {error}{units}") from error
 
     def replacing(self, stage: int) -> tuple[str, ...]:
-        """Return the names of the loads that replace reactions in a stage."""
         _, held, changed = self._held(stage)
         return tuple(number for name in changed for number in replacing(name, held.get(name)))
 

@@ -477,7 +477,6 @@ class OpenScene(StagedScene):
         return _KINDS.get(name, "")
 
     def replacing(self, stage: int) -> Sequence[str]:
-        """Return the names of the loads that replace reactions in a stage."""
         from ribbon_model.loads import REPLACING
 
         return [name for name in REPLACING if name in self.strip(stage).numbers]
@@ -508,7 +507,6 @@ class OpenScene(StagedScene):
         return _NATURAL[length, modulus] if length or modulus else unit
 
     def _held(self, stage: int) -> tuple[EndConfig, EndConfig, bool]:
-        """Return what is held in a stage, and whether that has changed since the first one."""
         if stage == 1:
             return self.start, self.finish, False
         one = self.stages[stage - 1]
@@ -544,7 +542,6 @@ class OpenScene(StagedScene):
 
     @property
     def name(self) -> str:
-        """The strip in words."""
         law = self.strip().section.law.name
         if self.closed is not None:
             twists = self.closed.half_twists

@@ -149,7 +149,6 @@ class OpenBranch(StoredBranch):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Columns of labelled points that a notebook shows."""
         followed = dict.fromkeys(stage.follow for stage in self.scene.stages)
         return ("point", "label", "name", "stage", *followed, "energy", "index")
 
@@ -186,7 +185,6 @@ class OpenBranch(StoredBranch):
     # --- places ---------------------------------------------------------------------------------------------------------
 
     def place(self, row: int) -> str:
-        """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
         event = self.events[row]
         name = self.followed(int(event["stage"]))
         value = without_round_off(event[name], abs(self.points[name][self.points["stage"] == event["stage"]]).max())
@@ -200,7 +198,6 @@ class OpenBranch(StoredBranch):
         return int(events["point"][place])
 
     def snaps(self) -> list[Snap]:
-        """Return the folds at which a stable piece ends, with the stable state below that the file has, if any."""
         pieces, found = self.pieces(), []
         for event in self.events:
             if event["label"] != b"LP" or 0 not in (event["index_before"], event["index_after"]):

@@ -321,7 +321,6 @@ class ConnectionCollocation(Collocation):
         return values, np.hstack([by_states, by_parameters * self.free_scales])
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         found = super().parameter_columns(x, names)
         found[self._conditions :] = self._conditions_at_ends(x, names)[2] * self.scales.parameters[self._indices(names)]
         return found

@@ -114,7 +114,6 @@ class ConnectionProblem(BoundaryValueProblem):
             check_periodic("field", self.batch("vector field"), periods, self.parameters)
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         return {"field": Signature(self.state_names, tuple(self.parameters), times=False).arguments}
 
     def discretized(

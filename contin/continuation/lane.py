@@ -220,7 +220,6 @@ class MeshLane(Lane):
         self._left: tuple[Array, _Begun] | None = None
 
     def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:
-        """Return whether the lane is that of a system of the same run, with these settings."""
         if not (self.settings is settings and self.noisy == noisy and getattr(system, "workspace", None) is self._work):
             return False
         if system is not self.system:  # it has another reference
@@ -229,7 +228,6 @@ class MeshLane(Lane):
 
     @staticmethod
     def knows(test: Event) -> bool:
-        """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
         return test.asks is not None or test.still > 0
 
     def _home(self) -> tuple[Array, Array]:

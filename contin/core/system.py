@@ -290,7 +290,6 @@ class System(Discretization):
         return self, x
 
     def parameter(self, x: Array, name: str) -> float:
-        """Return the value of one parameter."""
         return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
 
     def parameter_index(self, name: str) -> int:
@@ -436,7 +435,6 @@ class Composed(System):
         return functools.reduce(np.add, [term.bent(x, w, v) for term in self._terms])
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         found, which = np.zeros((self.equations, len(names))), self._indices(names)
         for term in self._terms:
             slopes = term.slopes(x, term.batch.columns(which, ()))
@@ -445,14 +443,12 @@ class Composed(System):
         return found
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
-        """Return the derivatives of a column (a parameter or functional) by x, shape (size,); None where they are not known."""
         if name not in self.integrated:
             return super().column_gradient(x, name)
         term, at = self._column_term, self.integrated.index(name)
         return term.by_x(term.weights(self._unit(name))[:, at, None] * term.slopes(x, term.columns)[:, at])
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
-        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
         return self._column_term.bent(x, self._unit(name), v) if name in self.integrated else super().column_bent(x, name, v)
 
     def _unit(self, name: str) -> Array:
@@ -470,11 +466,9 @@ class Composed(System):
         return type(self)(self.problem, *self._grid, **given)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """Return the same problem with other values of parameters that are not free."""
         return self._with(parameters=self._values | dict(values))
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Self, Array]:
-        """Return the same problem with other free parameters (values from x), and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
@@ -488,7 +482,6 @@ class Composed(System):
         return self._with(scales=Scales(states, parameters, found)), z
 
     def without_scales(self, x: Array) -> tuple[Self, Array]:
-        """Return the same problem in the user's units, and x for it."""
         other = self._with(scales=None)
         return other, self.carrier(other)(x)
 

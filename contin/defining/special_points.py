@@ -246,7 +246,6 @@ class ExtremumCurve(Defining):
         super().__init__(base)
 
     def on(self, base: System) -> ExtremumCurve:
-        """Return the defining system of another underlying one."""
         return ExtremumCurve(base, self.objective)
 
     def computed(self, x: Array) -> Stationarity:
@@ -319,7 +318,6 @@ class EventCurve(Defining):
         self.event, self._gradient = event, gradient
 
     def on(self, base: System) -> EventCurve:
-        """Return the defining system of another underlying one."""
         return EventCurve(base, self.event, self._gradient)
 
     def computed(self, x: Array) -> _Solutions:
