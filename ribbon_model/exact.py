@@ -489,18 +489,7 @@ def _segments(family, step):
 
 
 def _root(function, line, lower, upper):
-    """Return s in [lower, upper] at which function(line(s)) changes sign (Illinois false position)."""
-    ends = [lower, upper]
-    values = [function(line(s)) for s in ends]
-    last = None
-    for _ in range(80):
-        s = (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
-        value = function(line(s))
-        if value == 0 or min(abs(s - end) for end in ends) < 1e-14:
-            break
-        side = int(value * values[1] > 0)
-        ends[side], values[side] = s, value
-        if side == last:  # the other end was kept twice: halve its weight, otherwise convergence is linear
-            values[1 - side] /= 2
-        last = side
-    return s
+    """Return s in [lower, upper] at which function(line(s)) changes sign."""
+    from scipy.optimize import brentq  # .1 s, which a branch without a fold or a limit does not need
+
+    return brentq(lambda s: function(line(s)), lower, upper, xtol=1e-14)
