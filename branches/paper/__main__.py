@@ -10,7 +10,7 @@ if __name__ == "__main__":  # before the imports below, which take a second
 import importlib
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,31 +21,17 @@ if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
     from branches.paper.page import Section
 
 
-def _later(module: str, name: str) -> Callable[[Path], Section]:
-    """A function of a module that is imported when it is called."""
+#: What can be asked for, and the module whose function of this name computes it.
+ITEMS = {
+    "table1": "circles", "table2": "circles", "table3": "circles", "fig6": "unfolding", "fig9": "circles", "fig10": "circles",
+    "fig11": "diagram", "fig12": "diagram", "fig12b": "diagram", "curves": "curves", "snaps": "snaps", "finite-width": "curves",
+    "fig7": "shell",  # last: minutes of CalculiX
+}  # fmt: skip
 
-    def item(folder: Path) -> Section:
-        return getattr(importlib.import_module(module), name)(folder)
 
-    return item
-
-
-#: What can be asked for: name -> function(folder) -> Section; it may write pictures into the folder.
-ITEMS: dict[str, Callable[[Path], Section]] = {
-    "table1": _later("branches.paper.circles", "table1"),
-    "table2": _later("branches.paper.circles", "table2"),
-    "table3": _later("branches.paper.circles", "table3"),
-    "fig6": _later("branches.paper.unfolding", "fig6"),
-    "fig9": _later("branches.paper.circles", "fig9"),
-    "fig10": _later("branches.paper.circles", "fig10"),
-    "fig11": _later("branches.paper.diagram", "fig11"),
-    "fig12": _later("branches.paper.diagram", "fig12"),
-    "fig12b": _later("branches.paper.diagram", "fig12b"),
-    "curves": _later("branches.paper.curves", "curves"),
-    "snaps": _later("branches.paper.snaps", "snaps"),
-    "finite-width": _later("branches.paper.curves", "finite_width"),
-    "fig7": _later("branches.paper.shell", "fig7"),  # last: minutes of CalculiX
-}
+def section_of(name: str, folder: Path) -> Section:
+    """Return an item; it may write pictures into the folder."""
+    return getattr(importlib.import_module(f"branches.paper.{ITEMS[name]}"), name.replace("-", "_"))(folder)
 
 
 def parser() -> Parser:
@@ -90,7 +76,7 @@ def _compute(folder: Path, names: list[str], quiet: bool) -> None:
     with Progress("items", len(names), quiet) as progress:
         for name in progress.each(names, str):
             began = time.monotonic()
-            sections[name] = ITEMS[name](folder)
+            sections[name] = section_of(name, folder)
             # after each item: an interrupted call leaves a page of the finished items
             write(folder, {one: sections[one] for one in ITEMS if one in sections})
             progress.tell(f"{name}: {sections[name].title} ({time.monotonic() - began:.1f} s)\n")

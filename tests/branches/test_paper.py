@@ -3,7 +3,7 @@
 import pytest
 
 from branches.paper import shell_run as shell
-from branches.paper.__main__ import ITEMS, main
+from branches.paper.__main__ import ITEMS, main, section_of
 from branches.paper.page import Row
 from ribbon_model import exact
 
@@ -32,7 +32,7 @@ def computed(tmp_path_factory):
 
     def section(name):
         if name not in sections:
-            sections[name] = ITEMS[name](folder)
+            sections[name] = section_of(name, folder)
         return sections[name], folder
 
     with pytest.MonkeyPatch.context() as patch:
