@@ -125,7 +125,7 @@ def _branch(options, path: Path):
 
 
 def _diagram(options, path: Path):
-    from branches.graph.__main__ import read
+    from branches.graph import read
     from branches.graph.picture import figure
     from branches.graph.stored import read as read_closed
 

@@ -12,31 +12,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from branches.graph import closed as diagram
-from branches.graph.stored import CLOSED_FORMAT, OPEN_FORMAT, read_any
+from branches.graph import read
+from branches.graph.stored import CLOSED_FORMAT, OPEN_FORMAT
 from branches.scene.closed import and_nu
 from branches.store.command import Parser, answered, write_output
 from branches.store.files import StoreError
-
-
-def read(path: str | Path):
-    """Return the diagram in a folder (or in a ``diagram.json``); for a scene, its preview (`branches.graph.closed`).
-
-    Raises StoreError where there is none, or the scene is none.
-    """
-    if Path(path).suffix not in (".yaml", ".yml"):
-        return read_any(path)
-    from branches.graph.closed import preview  # scenes and quadratures take 0.3 s: not for questions about results
-    from branches.graph.kinds import graph_kind
-    from branches.scene.fields import ConfigError
-    from branches.scene.parse import load
-
-    try:
-        scene = load(path)
-    except ConfigError as error:
-        raise StoreError(str(error)) from error
-    if not graph_kind(scene).EXACT:
-        raise StoreError(f"{str(path)!r} is a scene of an open strip, for which there is no exact solution; run it")
-    return preview(scene)
 
 
 def parser() -> Parser:
