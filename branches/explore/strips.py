@@ -462,7 +462,7 @@ def _walk(
 def _fits(branch: StoredBranch, number: int, system: Collocation, x: np.ndarray) -> bool:
     """Return whether a solution has the columns of a point: beside a fold, another one has the same parameter."""
     names, row = branch.columns.shown(), branch.points[number]
-    values = branch.stages[branch.stage_of[number] - 1].values(point_of(system, x), names)
+    values = branch.stage_at(number).values(point_of(system, x), names)
     return all(abs(values[name] - row[name]) <= _SAME * (1 + abs(row[name])) for name in names)
 
 

@@ -53,9 +53,6 @@ class Place:
     """
 
     row: int
-    stage: int
-    column: str
-    value: float
     states: list[State]
     ways: dict[str, Barrier]
 
@@ -65,14 +62,10 @@ def places(branch: OpenBranch, quiet: bool = True) -> list[Place]:
     found = []
     rows = list(chosen_rows(branch, stable=True))
     with Progress("places with barriers", len(rows), quiet) as progress:
-        for row in progress.each(rows, partial(_where, branch)):
-            stage = int(branch.points["stage"][row])
-            column = branch.followed(stage)
-            place = Place(row, stage, column, float(branch.points[column][row]), states_at(branch, row), {})
-            mechanics = branch.stages[stage - 1]
-            if {0, 1} <= {state.index for state in place.states} and not unsupported(mechanics.strip):
-                place.ways.update(_ways(place.states))
-                found.append(place)
+        for row in progress.each(rows, partial(where, branch)):
+            states = states_at(branch, row)
+            if {0, 1} <= {state.index for state in states} and not unsupported(branch.stage_at(row).strip):
+                found.append(Place(row, states, _ways(states)))
     return found
 
 
@@ -98,7 +91,7 @@ def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[
         name = branch.followed(piece.stage)
         if not branch.same_strip(piece.rows[0], row, name):
             continue
-        here = branch.followed(int(branch.points["stage"][row]))
+        here = branch.stage_at(row).follow
         if value is not None and name != here:
             continue
         x, at = branch.points[name][piece.rows], float(branch.points[name][row]) if value is None else value
@@ -118,7 +111,7 @@ def _between(branch: OpenBranch, pair, part: float, row: int, others: dict[str, 
 
     ``others`` are numbers that are not those of the point.
     """
-    stage = branch.stages[int(branch.points["stage"][row]) - 1]
+    stage = branch.stage_at(row)
     strip = stage.strip
     kept = set(branch.kept().tolist())
     if not kept >= set(map(int, pair)):
@@ -197,14 +190,12 @@ def falls(branch: OpenBranch, quiet: bool = True) -> list[Fall]:
         for event in branch.events if event["label"] == b"LP" and 0 in (event["index_before"], event["index_after"])
     ]  # fmt: skip
     with Progress("folds", len(rows), quiet) as progress:
-        found = [
-            _fall(branch, row) for row in progress.each(rows, lambda row: branch.followed(int(branch.points["stage"][row])))
-        ]
+        found = [_fall(branch, row) for row in progress.each(rows, lambda row: branch.stage_at(row).follow)]
     return [fall for fall in found if fall is not None]
 
 
 def _fall(branch: OpenBranch, row: int) -> Fall | None:
-    stage = branch.stages[int(branch.points["stage"][row]) - 1]
+    stage = branch.stage_at(row)
     if row not in branch.kept() or unsupported(stage.strip):
         return None
     column, length = stage.follow, branch.scene.longest
@@ -233,7 +224,7 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
     lines = [f"to leave stable states{energies_in}:"] if found else []
     for place in found:
         energies = {state.name: state.potential for state in place.states}
-        lines.append(f"  {_where(branch, place.row)}:")
+        lines.append(f"  {where(branch, place.row)}:")
         for state in place.states:
             if state.index != 0:
                 continue
@@ -242,7 +233,7 @@ def report(branch: OpenBranch, quiet: bool = True) -> list[str]:
             lines.append(f"{head}: {_way(way, energies, factor)}")
     lines += [f"past folds at which stable states end{energies_in}:"] if snaps else []
     for fall in snaps:
-        lines.append(f"  {_where(branch, fall.row)}, point {fall.row}: {told(branch, fall)}")
+        lines.append(f"  {where(branch, fall.row)}, point {fall.row}: {told(branch, fall)}")
     return lines
 
 
@@ -252,11 +243,12 @@ def told(branch: OpenBranch, fall: Fall) -> str:
     return f"falls into {into}, which releases {fall.released * branch.scene.factor('potential'):.6g}"
 
 
-def _where(branch: OpenBranch, row: int) -> str:
-    stage = int(branch.points["stage"][row])
-    column = branch.followed(stage)
+def where(branch: OpenBranch, row: int) -> str:
+    """Return the value of the number that is followed at a point, and its stage, in words."""
+    stage = branch.stage_at(row)
+    column = stage.follow
     number = exact_text(float(f"{branch.points[column][row] * branch.scene.factor(column):.6g}"))
-    return f"{column} = {number} {branch.scene.unit(column)}".rstrip() + f" of stage {stage}"
+    return f"{column} = {number} {branch.scene.unit(column)}".rstrip() + f" of stage {stage.number}"
 
 
 def _way(way: Barrier | None, energies: dict[str, float], factor: float) -> str:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from branches.run.barriers import State, chosen_rows, states_at
+from branches.run.barriers import State, chosen_rows, states_at, where
 from branches.run.display import Progress
 from branches.store.open_branch import OpenBranch
 from contin import ContinError, MeshControl, Search, Settings
-from contin.lowlevel import Searched, exact_text, further, levels
+from contin.lowlevel import Searched, further, levels
 
 #: Size of random perturbations: half waves and constants of about one in all states. Of the strip of open_clamped.yaml at 75 %,
 #: eight of them beside each state find eight further states, of size .3 one, of size 2 one.
@@ -22,11 +22,9 @@ MOST = 10
 
 @dataclass(frozen=True)
 class Place:
-    """A place of a result, the states that it knows there, further ones in the order of their potential, and the account."""
+    """A point of a result, the states that it knows there, further ones in the order of their potential, and the account."""
 
-    stage: int
-    column: str
-    value: float
+    row: int
     known: list[State]
     found: list[State]
     account: Searched
@@ -37,18 +35,17 @@ def places(branch: OpenBranch, draws: int, quiet: bool = True) -> list[Place]:
     found = []
     rows = list(chosen_rows(branch))
     with Progress("places searched", len(rows), quiet) as progress:
-        for row in progress.each(rows, lambda row: branch.followed(int(branch.points["stage"][row]))):
+        for row in progress.each(rows, lambda row: branch.stage_at(row).follow):
             if known := states_at(branch, row):
                 found.append(_searched(branch, row, known, draws))
     return found
 
 
 def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> Place:
-    stage = int(branch.points["stage"][row])
-    column, mechanics, mesh = branch.followed(stage), known[0].stage, branch.scene.mesh
+    mechanics, mesh = known[0].stage, branch.scene.mesh
     control = MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals)
     search = Search(sizes=SIZES, draws=draws, most=MOST)
-    account = further([state.point for state in known], column, search, Settings(mesh=control))
+    account = further([state.point for state in known], branch.stage_at(row).follow, search, Settings(mesh=control))
     found = []
     for point in account.found:
         try:
@@ -56,7 +53,7 @@ def _searched(branch: OpenBranch, row: int, known: list[State], draws: int) -> P
         except ContinError:
             index = -1
         found.append(State("", mechanics, point, index, mechanics.strip.potential(point)))
-    return Place(stage, column, known[0].point[column], known, sorted(found, key=lambda state: state.potential), account)
+    return Place(row, known, sorted(found, key=lambda state: state.potential), account)
 
 
 def report(branch: OpenBranch, draws: int, quiet: bool = True) -> list[str]:
@@ -64,10 +61,8 @@ def report(branch: OpenBranch, draws: int, quiet: bool = True) -> list[str]:
     factor, unit = branch.scene.factor("potential"), branch.scene.unit("potential")
     lines = [f"further states{f', energies in {unit}' if unit else ''}:"]
     for place in places(branch, draws, quiet):
-        value = exact_text(float(f"{place.value * branch.scene.factor(place.column):.6g}"))
-        where = f"{place.column} = {value} {branch.scene.unit(place.column)}".rstrip()
         tried = f"{place.account.guesses.total()} guesses; {place.account.stop}"
-        lines.append(f"  {where} of stage {place.stage}: {len(place.known)} known, {len(place.found)} more ({tried})")
+        lines.append(f"  {where(branch, place.row)}: {len(place.known)} known, {len(place.found)} more ({tried})")
         energies = [state.potential for state in place.known]
         for state in place.found:
             index = "unknown" if state.index < 0 else state.index

@@ -154,6 +154,10 @@ class StoredBranch(ABC):
         """Return the number that a stage follows."""
         return self.stages[stage - 1].follow
 
+    def stage_at(self, row: int) -> Any:
+        """Return the stage of a point."""
+        return self.stages[int(self.stage_of[row]) - 1]
+
     def conjugate(self, name: str) -> str:
         """Return the column that is shown where a number is followed."""
         return next((stage.conjugate for stage in self.stages if stage.follow == name), "energy")

@@ -53,10 +53,10 @@ def searched(result):
 
 
 @pytest.mark.full
-def test_the_arch_and_the_shape_of_an_s(searched):
+def test_the_arch_and_the_shape_of_an_s(result, searched):
     """The arch to the other side is stable; the S is planar, a saddle, and to either side. The run has neither."""
     (place,) = searched
-    assert (place.stage, place.column, place.value) == (1, "distance", pytest.approx(0.75))
+    assert result.points["distance"][place.row] == pytest.approx(0.75)
     (known,) = place.known
     arch = planar(lambda t: 1.2 * np.sin(2 * np.pi * t), 39.0)
     s_shape = planar(lambda t: 1.2 * np.sin(3 * np.pi * t), 80.0)

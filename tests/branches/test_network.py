@@ -546,7 +546,7 @@ def test_the_barrier_of_a_buckled_column(run, monkeypatch):
     assert (stable["index"], saddle["index"]) == (0, 1)
     found = places(branch)
     place, at_the_end = found
-    assert [round(one.value, 9) for one in (place, at_the_end)] == [85.0, 86.0]
+    assert branch.points["P"][[place.row, at_the_end.row]].round(9).tolist() == [85.0, 86.0]
     ((name, way),) = place.ways.items()
     assert name == f"point {stable['point']}"
     assert way.behind == f"an image of {name}"
