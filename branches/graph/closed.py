@@ -45,20 +45,10 @@ def part(branch, file: str, numbers: object = None) -> Part:
 
 
 def add_branch(graph, branch, name: str) -> bool:
-    """Add a stored branch to the diagram.
+    """Add a stored branch to the diagram; ``name`` is its file, which every edge carries.
 
-    Parameters
-    ----------
-    graph : networkx.MultiGraph
-    branch : branches.store.branch.StoredBranch
-    name : str
-        Its file; every edge carries it.
-
-    Returns
-    -------
-    bool
-        False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
-        domain, and its images under the symmetries of the primary branch.)
+    Return False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each domain,
+    and its images under the symmetries of the primary branch.)
     """
     if not branch.config["origin"]:
         return add(graph, part(branch, name))
