@@ -35,13 +35,10 @@ _AMBIENT = 0.45
 
 @dataclass(frozen=True)
 class View:
-    """The side from which strips are seen.
+    """The side from which strips are seen: azimuth and elevation of the eye, in degrees.
 
-    Attributes
-    ----------
-    azimuth, elevation : float
-        Of the eye, in degrees: from the first axis around the vertical one, and above the horizontal plane. At azimuth -90 the
-        first axis points to the right.
+    They are counted from the first axis around the vertical one, and above the horizontal plane. At azimuth -90 the first axis
+    points to the right.
     """
 
     azimuth: float

@@ -91,14 +91,7 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Structure:
-    """Several strips in space.
-
-    Attributes
-    ----------
-    parts : tuple of Shape
-    fixtures : tuple of Fixture
-        Their joints and supports.
-    """
+    """Several strips in space, with their joints and supports."""
 
     parts: tuple[Shape, ...]
     fixtures: tuple[Fixture, ...] = ()

@@ -25,14 +25,10 @@ _MOST_BYTES = 22_500_000
 
 
 def gather(results: list[str], quiet: bool = True) -> dict:
-    """Everything the page needs, ready for JSON; unless ``quiet``, a line of progress is shown.
+    """Return everything the page needs, ready for JSON; unless ``quiet``, a line of progress is shown.
 
-    Raises StoreError where one of them cannot be read, holds no branch, or is of the other kind.
-
-    Parameters
-    ----------
-    results : list of str
-        Branch files, folders of diagrams, files of `contin.save`, or folders of those.
+    Results are branch files, folders of diagrams, files of `contin.save`, or folders of those. Raises StoreError where one of
+    them cannot be read, holds no branch, or is of the other kind.
 
     Returns
     -------

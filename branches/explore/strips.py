@@ -212,11 +212,8 @@ _FRAMES = 40
 def way_down(branch: StoredBranch, event: np.void) -> dict | None:
     """Return what a strip does that is pushed past a fold, for the page; None unless it is stable on one side of the fold.
 
-    Returns
-    -------
-    dict
-        ``kappa_n`` where it is let go; ``ends``: the states in which it comes to rest, of both metrics and both signs of the
-        kick, each once; ``columns`` and ``shapes`` on the first of these ways. Or ``failed``, a sentence.
+    ``kappa_n`` is where it is let go; ``ends`` are the states in which it comes to rest, of both metrics and both signs of the
+    kick, each once; ``columns`` and ``shapes`` are on the first of these ways. Or ``failed`` is a sentence.
     """
     if "index_before" not in event.dtype.names or 0 not in (event["index_before"], event["index_after"]):
         return None

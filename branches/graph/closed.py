@@ -309,21 +309,11 @@ def describe_node(node) -> str:
 
 
 def preview(scene: Scene | Sweep, step: float = 0.2):
-    """Return the preview of the diagram of a scene, which is never mixed with computed branches.
+    """Return the preview of a diagram of closed strips as a networkx.MultiGraph; it is never mixed with computed branches.
 
-    Parameters
-    ----------
-    scene : Scene or Sweep
-        Of closed strips.
-    step : float
-        Largest distance between points, as for `ribbon_model.exact.curve`.
-
-    Returns
-    -------
-    networkx.MultiGraph
-        As from `branches.run.many.run_many`. The arclength of its edges is that in the plane of the quadrature's unknowns;
-        ``exact`` holds the points of the quadrature. A branch whose quadrature fails is listed, with the reason, in
-        ``graph.graph["failed"]``.
+    ``step`` is the largest distance between points, as for `ribbon_model.exact.curve`. The arclength of its edges is that in
+    the plane of the quadrature's unknowns; ``exact`` holds the points of the quadrature. A branch whose quadrature fails is
+    listed, with the reason, in ``graph.graph["failed"]``.
     """
     graph, failed = new_graph(scene.title), {}
     for one in sorted(scene.scenes.values(), key=lambda one: one.n * one.m):

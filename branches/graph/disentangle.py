@@ -81,7 +81,7 @@ class Course:
 
 
 def heights(curves, ends, window) -> list[np.ndarray]:
-    """The heights of branches in the disentangled picture.
+    """Return the heights of branches in the disentangled picture, shape (K,) each.
 
     Parameters
     ----------
@@ -91,10 +91,6 @@ def heights(curves, ends, window) -> list[np.ndarray]:
         Heights of both ends of each, None where it is free; and whether such a branch rises (1) or falls (-1).
     window : (float, float)
         Of kappa_n.
-
-    Returns
-    -------
-    list of ndarray, shape (K,)
     """
     from threadpoolctl import threadpool_limits
 

@@ -20,15 +20,8 @@ _FEWEST = 4
 def places(pieces: Sequence[dict], column: str, value: float, wanted: Sequence[str]) -> list[tuple[int, dict[str, float]]]:
     """Return the places at which a column of some pieces has a value, in order.
 
-    Parameters
-    ----------
-    pieces : sequence of dict
-        Columns as lists; all hold ``arclength``, ``column`` and those ``wanted``.
-
-    Returns
-    -------
-    list of (int, dict)
-        The number of the piece, and the wanted columns there.
+    Each is the number of the piece, and the wanted columns there. Pieces hold columns as lists: ``arclength``, ``column`` and
+    those ``wanted``.
     """
     lengths = np.array([len(piece[column]) for piece in pieces], dtype=int)
     above = np.fromiter(itertools.chain.from_iterable(piece[column] for piece in pieces), float, lengths.sum()) > value

@@ -24,7 +24,7 @@ _LONGEST = 80.0
 
 
 def name_lines(axes, named, obstacles, taken=()) -> list[str]:
-    """Write names on lines; the layout of the figure has to be done.
+    """Write names on lines, and return those for which there is no place; the layout of the figure has to be done.
 
     A line on which there is no room for its name has it beside, at the end of a thin line.
 
@@ -36,11 +36,6 @@ def name_lines(axes, named, obstacles, taken=()) -> list[str]:
         Other lines, and marks, by their x and y.
     taken : list of matplotlib.transforms.Bbox
         Parts of the picture, in pixels, where no name may stand.
-
-    Returns
-    -------
-    list of str
-        Names of lines that have no place for one.
     """
     own = [_resampled(axes, x, y) for _, x, y in named]
     others = [_resampled(axes, x, y) for x, y in obstacles] + [_grid(box) for box in taken]

@@ -95,22 +95,18 @@ class Line:
 
 
 def figure(graph, law: str, nu: float, window=None, disentangle: bool = True, size: float | None = None):
-    """The diagram of one law and nu.
+    """Return the diagram of one law and nu as a matplotlib figure.
 
     Parameters
     ----------
     graph : networkx.MultiGraph
-        As of `branches.diagram_graph`.
+        As of `branches.graph.closed`.
     window : (float, float), optional
         Of kappa_n; by default `WINDOW`, or the part of it in which the special points are.
     disentangle : bool
         Add the panel where the heights between the circles are free (`branches.graph.disentangle`).
     size : float, optional
         Width in inches; by default 13, or 7.5 of one panel.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     usual = 13 if disentangle else 7.5
     with narrowed((size or usual) / usual):

@@ -131,12 +131,7 @@ def version() -> str:
 def run_ccx(deck: str, time_limit: float, stopped: Callable[[], bool] = lambda: False) -> tuple[str, str]:
     """Run CalculiX on a deck in a temporary folder, on one core.
 
-    Returns
-    -------
-    answer : str
-        The ``.dat`` file; incomplete if the run failed.
-    problem : str
-        The reason of a failure, or ''.
+    Return the ``.dat`` file, which is incomplete if the run failed, and the reason of a failure, or ''.
     """
     with tempfile.TemporaryDirectory(prefix="ccx-") as name:
         folder = Path(name)

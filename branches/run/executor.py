@@ -270,12 +270,8 @@ def run_jobs(
 ) -> Iterator[tuple[object, object]]:
     """Run ``function(job)`` for every job, ``limit`` at a time; yield (job, result or exception) as they finish.
 
-    Parameters
-    ----------
-    source : callable
-        ``source(running)`` gets the list of running jobs; it returns the next job, `WAIT`, or None at the end.
-    function : callable
-        A function at module level, so that it can be sent to another process.
+    ``source(running)`` gets the list of running jobs and returns the next job, `WAIT`, or None at the end. The function is at
+    module level, so that it can be sent to another process.
     """
     running: dict[futures.Future, object] = {}
     exhausted = False

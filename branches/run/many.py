@@ -34,10 +34,7 @@ Job = tuple[str, str, dict[str, Any]]
 def compute(job: Job) -> tuple[bytes, str, Any]:
     """Compute one branch, in any process: its file, its scene as text, and the values of what varies.
 
-    Returns
-    -------
-    image, problem, part
-        The image of its file, the reason of a failure or '', and its part of the graph.
+    Return the image of its file, the reason of a failure or '', and its part of the graph.
     """
     file, text, numbers = job
     found = compute_scene(parse(text, file), Display(silent=True))
@@ -85,18 +82,9 @@ def run_many(
 ) -> str:
     """Compute the branches of a scene that ``folder`` does not hold yet, and the graph of all.
 
-    Raises StoreError where the folder cannot be written to, another run is writing to it, or it holds another scene and
-    ``overwrite`` is not set; ExecutorError where the scheduler cannot be used.
-
-    Parameters
-    ----------
-    time_limit : float, optional
-        Largest time in seconds of a branch in a process of this machine.
-
-    Returns
-    -------
-    str
-        "complete", or "lost" if a branch failed or was lost on the way (the others are there).
+    Return "complete", or "lost" if a branch failed or was lost on the way (the others are there). A branch in a process of this
+    machine may take ``time_limit`` seconds. Raises StoreError where the folder cannot be written to, another run is writing to
+    it, or it holds another scene and ``overwrite`` is not set; ExecutorError where the scheduler cannot be used.
     """
     began, folder = time.perf_counter(), Path(folder)
     kind = graph_kind(sweep)
@@ -153,11 +141,8 @@ def _stored_scenes(sweep: Sweep, folder: Path) -> Mapping[str, Scene]:
 def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -> tuple[dict[str, str], int]:
     """Compute the missing branches, and add their parts of the graph.
 
-    Returns
-    -------
-    failed, left_out
-        The reasons of those that failed, by file in the order of the scene, and the number of branches that are there from
-        their other ends.
+    Return the reasons of those that failed, by file in the order of the scene, and the number of branches that are there from
+    their other ends.
     """
     kind, parts = found
     graph = new_graph("", kind.FORMAT)

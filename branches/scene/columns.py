@@ -32,15 +32,8 @@ class Source(Protocol):
 class Row:
     """A labelled or unlabelled point on its way into the tables; what columns read of it is computed once.
 
-    Parameters
-    ----------
-    point : contin.Point
-    number : int
-        The point's place in the table.
-    stage : Source
-        The stage that it belongs to.
-    others : sequence of str
-        Names of all values of the tables, some of which this stage may lack.
+    ``number`` is the point's place in the table, ``stage`` the one that it belongs to; ``others`` are the names of all values
+    of the tables, some of which this stage may lack.
     """
 
     def __init__(self, point: Point, number: int, stage: Source, others: Sequence[str]):

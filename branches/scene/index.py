@@ -42,13 +42,8 @@ _KEPT = 2 * _LOOKS + 4
 class SymmetryWatch(Watch):
     """Compute the index of points of one branch, each once.
 
-    Parameters
-    ----------
-    law : Law
-    system, x :
-        The first point, which determines the symmetry of the branch.
-    from_circle : bool
-        The branch begins on a circle, and may end on one.
+    The first point ``system, x`` determines the symmetry of the branch. One ``from_circle`` begins on a circle, and may end on
+    one.
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):

@@ -79,17 +79,7 @@ def begins(event: np.void) -> bool:
 
 
 def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
-    """What a labelled point is in a diagram.
-
-    Parameters
-    ----------
-    label, name : str
-        Of the point.
-    reason : str
-        Why its run stopped.
-    secondary : bool
-        Whether it is on a secondary branch.
-    """
+    """Return what a labelled point is in a diagram; ``reason`` says why its run stopped."""
     if name == START:
         return "secondary bifurcation" if secondary else "circle"
     if name == TRIVIAL:

@@ -133,10 +133,7 @@ def dump(scene: Scene | Sweep) -> str:
 def difference(stored: Scene, scene: Scene, ignored: Sequence[str] = ()) -> str:
     """Return the first field in which the scene of a file differs from another scene, in words; '' if they agree.
 
-    Parameters
-    ----------
-    ignored : sequence of str
-        Fields that may differ: ``title``, or ``steps.max_points`` for one inside another.
+    Fields that are ``ignored`` may differ: ``title``, or ``steps.max_points`` for one inside another.
     """
     if stored.KIND != scene.KIND:
         return f"a {stored.KIND} there, a {scene.KIND} here"

@@ -182,12 +182,7 @@ def _kind(name: str) -> str:
 def no_state(run: Continuation, place: str) -> Stop:
     """Return why a run ended without convergence, and the first change of a field of the scene with which it goes on.
 
-    Parameters
-    ----------
-    run : Continuation
-        It has stopped with the reason "no convergence".
-    place : str
-        Where it stopped, as in "turn = 3.1".
+    It has stopped with the reason "no convergence" at a ``place`` as in "turn = 3.1".
     """
     step = exact_text(run.settings.min_step)
     if _goes_on(run.state, run.settings):

@@ -139,18 +139,10 @@ class BranchWriter:
         return time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
 
     def checkpoint(self, start, status: str, stop: Stop | None = None) -> None:
-        """Write all points so far, and the state for a resumed run.
+        """Write all points so far, and the state for a resumed run, whose first point ``start`` is (system, x, tangent).
 
-        Raises StoreError where the file cannot be written; the file on disk is unchanged.
-
-        Parameters
-        ----------
-        start : tuple (system, x, tangent)
-            The first point of the run.
-        status : str
-            "running", "complete", "interrupted" or "lost".
-        stop : Stop, optional
-            The reason why it ended.
+        ``status`` is "running", "complete", "interrupted" or "lost", ``stop`` the reason why it ended. Raises StoreError where
+        the file cannot be written; the file on disk is unchanged.
         """
         began = time.monotonic()
         self.flush()
