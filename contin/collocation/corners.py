@@ -47,11 +47,7 @@ def switches(
     """Return the switches of time alone that operations depend on, and those that states or free parameters move.
 
     Of the latter, those that unknowns found by iteration depend on are left out: there is no other outcome to compare with.
-
-    Parameters
-    ----------
-    states, free : sequence of int
-        Places of the states, and of parameters that may change.
+    States and free parameters are given by their places.
     """
     every, needed = [*results, time, *states, *free], tape.needed(results)
     varies, moves = tape.reading(every, [time, *states]), tape.reading(every, [*states, *free])
@@ -274,16 +270,9 @@ NOWHERE = Switching(np.empty(0), np.empty(0), np.empty(0, dtype=bool), ())
 
 
 def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x: Array) -> Switching:
-    """Return the places of a solution where conditions switch, without those of smooth selections.
+    """Return the places of a solution x where conditions switch, without those of smooth selections.
 
-    Parameters
-    ----------
-    system : Collocation
-    selections : Selections
-    sizes : callable
-        ``sizes()`` are those of what the values of the functions are integrated to, shape (values,).
-    x : ndarray
-        A solution.
+    ``sizes()`` are those of what the values of the functions are integrated to, shape (values,).
     """
     p = system.all_parameters(x)
 

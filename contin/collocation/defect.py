@@ -103,12 +103,7 @@ def split(degree: int, ends: Array) -> tuple[Array, Array]:
 
 
 class Defect:
-    """What the estimates of all solutions on one mesh share.
-
-    Parameters
-    ----------
-    system : Collocation
-    """
+    """What the estimates of all solutions on one mesh share."""
 
     def __repr__(self) -> str:
         return f"Defect({self.system!r})"
@@ -127,22 +122,10 @@ class Defect:
     def error(self, x: Array, factors: Any, columns: Mapping[str, float]) -> float:
         """Return the largest estimated error of states, rates, free parameters and integrals, relative to 1 + size.
 
-        States and rates (times the length of the domain) are divided by the sizes of the states. The size of an integral is
-        that of its integrand, integrated, plus its size where all unknowns are as large as their sizes: an energy may vanish.
-
-        Parameters
-        ----------
-        x : ndarray, shape (size,)
-            A solution.
-        factors : Factors
-            Of [F_x; row] at x or close to it.
-        columns : mapping of str to float
-            The integrals on this mesh, by name.
-
-        Returns
-        -------
-        float
-            NaN where the functions are not finite.
+        It is NaN where the functions are not finite. States and rates (times the length of the domain) are divided by the sizes
+        of the states. The size of an integral is that of its integrand, integrated, plus its size where all unknowns are as
+        large as their sizes: an energy may vanish. Factors are those of [F_x; row] at the solution x or close to it;
+        ``columns`` are the integrals on this mesh, by name.
         """
         system, h, tables, n = self.system, self.h, self.tables, self.n
         points, left = np.empty((self.times.size, n)), np.zeros(system.equations + 1)

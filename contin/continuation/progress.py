@@ -21,12 +21,9 @@ _FIRST, _BETWEEN = 1.0, 0.2
 
 
 class Progress:
-    """The line of progress of one call; raise ProblemError where ``wanted`` is none of these.
+    """The line of progress of one call; raise ProblemError where ``wanted`` is neither True, False nor None.
 
-    Parameters
-    ----------
-    wanted : bool or None
-        Whether to show it; None shows it where standard error is a terminal.
+    None shows it where standard error is a terminal.
     """
 
     def __init__(self, wanted: bool | None) -> None:

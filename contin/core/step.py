@@ -210,12 +210,8 @@ ROUNDS = 12
 def settled(trial: Trial, along: Array, newton: Newton) -> Trial:
     """Return a point as corrected on a mesh with points where conditions switch, and carried back to its own mesh.
 
-    The same trial is returned where there is no need, and the last one that is found where Newton's method fails.
-
-    Parameters
-    ----------
-    along : ndarray, shape (size,)
-        The direction in which the point keeps its place: a tangent of the curve on the trial's mesh.
+    The same trial is returned where there is no need, and the last one that is found where Newton's method fails. A point keeps
+    its place in the direction ``along``, shape (size,): a tangent of the curve on the trial's mesh.
     """
     found = trial
     for _ in range(ROUNDS):

@@ -89,16 +89,7 @@ def check_given(problem: _Given, u: Array, p: Array) -> None:
 
 
 class EquilibriumForm(DenseForm):
-    """That of an equilibrium, in unknowns divided by their sizes.
-
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, n)
-        In the user's units.
-    sizes : ndarray, shape (n,)
-    along : callable
-        As in `DenseForm`.
-    """
+    """That of an equilibrium, in unknowns divided by their sizes; the Jacobian (n, n) is in the user's units."""
 
     def __init__(self, jacobian: Array, sizes: Array, along: Callable[[Any], Array]) -> None:
         super().__init__(jacobian * sizes / sizes[:, None], len(jacobian), along, np.ones(len(jacobian)))

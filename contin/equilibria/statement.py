@@ -255,14 +255,7 @@ class AlgebraicProblem(Restated):
 
 
 class KeptProblem(AlgebraicProblem):
-    """The equilibria of M u' = F with a singular M: states without rates are found, from a start, and are columns.
-
-    Parameters
-    ----------
-    whole : AlgebraicProblem
-    start : sequence of float
-        Of the states that are found, in their order.
-    """
+    """The equilibria of M u' = F with a singular M: states without rates are found, from their ``start``, and are columns."""
 
     def __init__(self, whole: AlgebraicProblem, start: Sequence[float]) -> None:
         mass, names = whole.mass, whole.state_names

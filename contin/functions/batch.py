@@ -62,17 +62,9 @@ _Made = tuple[Program, int, tuple[int, ...]]
 
 
 class Recorded:
-    """Functions that are recorded, for `contin.functions.batch.Batch`.
+    """Functions that are recorded, for `contin.functions.batch.Batch`; raise Unrecordable where they cannot be.
 
-    Attributes
-    ----------
-    recording : Recording
-    kept : dict
-        Everything that has been made for these functions, whatever the sizes are.
-
-    Raises
-    ------
-    Unrecordable
+    ``kept`` is everything that has been made for these functions, whatever the sizes are.
     """
 
     def __init__(self, functions: Sequence[UserFunction], signature: Signature) -> None:

@@ -93,13 +93,7 @@ class Slope(NamedTuple):
 
 
 def program(tape: Tape, results: Sequence[tuple[int, int | Slope]], inputs: Inputs) -> Program:
-    """Return the program that computes operations and stores each in a column of the values, or at a `Slope`.
-
-    Parameters
-    ----------
-    results : sequence of (place, where)
-    inputs : Inputs
-    """
+    """Return the program that computes operations and stores each in a column of the values, or at a `Slope`."""
     return _Lowering(tape, results, inputs).program()
 
 

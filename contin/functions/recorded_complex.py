@@ -92,12 +92,7 @@ def _power(a: ComplexNumber, b: ComplexNumber) -> Any:
 
 
 class ComplexNumber:
-    """A complex number whose parts are numbers of one tape; Python's arithmetic on it gives others.
-
-    Attributes
-    ----------
-    real, imag : Number
-    """
+    """A complex number whose parts are numbers of one tape; Python's arithmetic on it gives others."""
 
     __slots__ = ("imag", "real", "tape")
 

@@ -112,10 +112,7 @@ def checked(functions: Sequence[UserFunction], signature: Signature) -> Recordin
 def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequence[Any]]) -> list[int]:
     """Return the places of a function's values, joined over all outcomes of its decisions; raise Unrecordable where that fails.
 
-    Parameters
-    ----------
-    call : callable
-        ``call(copy)`` calls a copy of the function that takes recorded numbers, and returns its values.
+    ``call(copy)`` calls a copy of the function that takes recorded numbers, and returns its values.
     """
     paths, before = _Paths(tape, functools.partial(call, prepared(function)), tape.searches), tape.decide
     try:
@@ -349,11 +346,8 @@ def result_count(function: Function, arguments: Arguments, what: str) -> int:
 def function_of(function: Function, arguments: Arguments) -> RecordedFunction:
     """Return a user's function as a recording, which can be pickled and compared; raise Unrecordable where that fails.
 
-    Parameters
-    ----------
-    arguments : sequence of tuple of str, list of them, or None
-        Names of the components of each argument; None for a number, a list for a tuple of named tuples. A function that fills
-        an array fills one like the first of them with names.
+    ``arguments`` are the names of the components of each; None for a number, a list for a tuple of named tuples. A function
+    that fills an array fills one like the first of them with names.
     """
     tape, single = Tape(NUMPY), True
     inputs = [tape.input(("argument", number)) for number in range(component_count(list(arguments)))]

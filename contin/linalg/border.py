@@ -164,14 +164,9 @@ def cosine(a: Array, b: Numbers) -> float:
 
 
 def orthonormal(vectors: Array, weights: Array | float = 1.0) -> Array:
-    """Return an orthonormal basis of the space of some vectors, in a weighted inner product and with their orientation.
+    """Return an orthonormal basis of the space of vectors (k, size), in a weighted inner product and with their orientation.
 
     Determinants of equations that are stated on the basis keep their sign when borders are renewed.
-
-    Parameters
-    ----------
-    vectors : ndarray, shape (k, size)
-    weights : ndarray, shape (size,)
     """
     root = np.sqrt(weights)
     columns, triangle = np.linalg.qr((vectors * root).T)
@@ -251,13 +246,7 @@ def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2
     """Return right and left singular vectors of the ``count`` smallest singular values, as rows, by block inverse iteration.
 
     It starts from random vectors, not from those of the point before: a resumed run must decide as one that was never
-    interrupted.
-
-    Returns
-    -------
-    right, left : ndarray, shape (count, size)
-    response : ndarray, shape (count, count)
-        right J^-1 left^T: about the reciprocals of the singular values.
+    interrupted. Third is right J^-1 left^T, shape (count, count): about the reciprocals of the singular values.
     """
     right = random_rows(min(count, size), size)
     for _ in range(rounds):

@@ -81,14 +81,8 @@ class Around(NamedTuple):
 class ComponentFactors:
     """A factored bordered matrix of components: `contin.linalg.blocks.Factors`.
 
-    Vectors of unknowns are [states at all nodes | parameters], vectors of equations [collocation | rows around it]. Raises
-    ValueError if the matrix is not square.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-        All states belong to one of them.
-    around : Around
+    Vectors of unknowns are [states at all nodes | parameters], vectors of equations [collocation | rows around it]. All states
+    belong to one of the parts. Raises ValueError if the matrix is not square.
     """
 
     def __init__(self, parts: Sequence[Part], around: Around) -> None:

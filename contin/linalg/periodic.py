@@ -315,13 +315,8 @@ def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vect
 def interval_matrices(value: Array, slope: Array, h: Array, jacobian: Array) -> Array:
     """Return the collocation equations of each interval, shape (N, d n, (d + 1) n), by its nodes in order.
 
-    Parameters
-    ----------
-    value, slope : ndarray, shape (d, d + 1)
-        Tables of the `Basis`.
-    h : ndarray, shape (N,)
-    jacobian : ndarray, shape (N d, n, n)
-        Derivatives of the right-hand side at the Gauss points.
+    ``value`` and ``slope`` (d, d + 1) are tables of the `Basis`; the Jacobian (N d, n, n) of the right-hand side is that at the
+    Gauss points.
     """
     d, n = len(value), jacobian.shape[1]
     matrices = np.empty((len(h), d * n, (d + 1) * n))

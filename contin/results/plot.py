@@ -280,12 +280,8 @@ def said(point: Point, number: int) -> str:
 def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     """Cut a branch where its stability changes; without any index, there is one piece.
 
-    Yields
-    ------
-    stable : bool or None
-        Whether the energy has a minimum on the piece; None where no point has an index, or the ends of a step disagree.
-    piece : slice
-        Points of the piece; its ends belong to the pieces beside it too.
+    Yields whether the energy has a minimum on the piece (None where no point has an index, or the ends of a step disagree), and
+    the points of the piece; its ends belong to the pieces beside it too.
     """
     moving = bool(points) and points[0].system.unstable(points[0].x) is not None
     if len(points) < 2 or (not moving and all(point.index is None for point in points)):

@@ -108,25 +108,13 @@ class Profile:
         self.states: Array = self._system.states(point.x)[:, self._at]
 
     def __getitem__(self, name: str) -> Array:
-        """Return one state at the nodes, shape (K,).
-
-        Raises
-        ------
-        KeyError
-            There is none of this name.
-        """
+        """Return one state at the nodes, shape (K,); raise KeyError where there is none of this name."""
         if name not in self.names:
             raise KeyError(f"{name!r} is none of {', '.join(self.names)}")
         return self.states[:, self.names.index(name)]
 
     def __call__(self, s: Array) -> Array:
-        """Return the states at coordinates (m,) between the ends of the segment, shape (m, n).
-
-        Raises
-        ------
-        ProblemError
-            A coordinate outside the segment.
-        """
+        """Return the states at coordinates (m,) between the ends of the segment, shape (m, n); raise ProblemError outside."""
         places = np.atleast_1d(np.asarray(s, dtype=float))
         t = (places - self.begin) / (self.end - self.begin)
         outside = ~((t >= -LOCATED) & (t <= 1 + LOCATED))

@@ -217,18 +217,8 @@ class Searched:
 class Site:
     """The solutions that are known at one value of the primary parameter, and the search for others there.
 
-    Parameters
-    ----------
-    primary, value : str, float
-    settings : Settings
-        Of Newton's method and the mesh.
-    symmetries : sequence of callable
-        With the identity.
-    tolerance : float
-        Relative distance below which two solutions are one.
-    search : Search
-    number : int
-        Of the value: each has random numbers of its own.
+    ``symmetries`` have the identity among them. Solutions at a smaller relative distance than ``tolerance`` are one. Each value
+    has random numbers of its own, by its ``number``.
     """
 
     def __init__(
@@ -265,12 +255,8 @@ class Site:
     def search(self, elsewhere: Sequence[Point], follow: Callable[[Point, Searched], None]) -> int:
         """Search from all guesses that were not tried before, add to the account, and return how many solutions are found.
 
-        Parameters
-        ----------
-        elsewhere : sequence of Point
-            Solutions at other values; there is one at least, or one is known here.
-        follow : callable
-            Follows a new solution, and adds what becomes known by it.
+        ``elsewhere`` are solutions at other values; there is one at least, or one is known here. ``follow`` follows a new
+        solution, and adds what becomes known by it.
         """
         account, before = self.account, len(self.account.found)
         account.known = account.known if account.stop else len(self.known)

@@ -170,11 +170,8 @@ def solved(
 ) -> Point:  # fmt: skip
     """Return the solution near a vector of unknowns, on a mesh adapted to it; one of the free parameters may be held.
 
-    With ``explains``, time is taken for a solution at which F_x is singular, and to say why none is found.
-
-    Raises
-    ------
-    ConvergenceError, ProblemError
+    With ``explains``, time is taken for a solution at which F_x is singular, and to say why none is found. Raises
+    ConvergenceError or ProblemError where none is.
     """
 
     def corrected(system: System, x: Array) -> Corrected:
@@ -223,13 +220,9 @@ def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
 
 
 def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton, explains: bool) -> Corrected:
-    """Return the solution near x.
+    """Return the solution near x; raise ConvergenceError where Newton's method fails.
 
-    Raises
-    ------
-    ProblemError
-        Newton's method fails, and the equations are singular at the guess, or everywhere; the message says why.
-    ConvergenceError
+    Raises ProblemError, which says why, where the equations are singular at the guess, or everywhere.
     """
     try:
         if others:

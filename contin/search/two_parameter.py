@@ -69,13 +69,9 @@ _HALF = 7.0
 
 
 class Takens:
-    """The normal form of a Bogdanov-Takens point; raise ProblemError where the normal form is degenerate.
+    """The normal form of a Bogdanov-Takens point of a system with two free parameters, in the user's units.
 
-    Parameters
-    ----------
-    base : Algebraic
-        In the user's units, with two free parameters.
-    x : ndarray, shape (size,)
+    Raises ProblemError where it is degenerate.
     """
 
     def __init__(self, base: Algebraic, x: Array) -> None:
