@@ -482,7 +482,7 @@ def _reduced(system: Collocation, x: Array, parts: Sequence[_Part], phases: bool
 def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     """Return the derivatives of e by (x0, x1), shape (conditions, 2n), and the second ones of Phi + sigma.e, shape (2n, 2n)."""
     problem: Any = system.problem
-    n, batch, states = problem.dimension, problem.batch("boundary"), system.states(x)
+    n, batch, states = problem.dimension, system.unscaled, system.states(x)
     columns = batch.columns([])
     jacobian = batch.jacobian(np.zeros(1), states[:1], states[-1:], system.all_parameters(x), columns)[1][0]
     by_ends = np.concatenate([jacobian[:, :n], jacobian[:, 2 * n : 3 * n]], axis=1)

@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from contin import draws
 from contin.arrays import Array, Indices, Places
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
@@ -30,6 +31,7 @@ from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
 from contin.levels import APART, CORRECTED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
+from contin.linalg.border import random_rows
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
 from contin.linalg.condensation import Factorization
 from contin.problems.statement import Statement
@@ -199,6 +201,7 @@ class Collocation(Composed):
         """Return a copy with all that was computed, which ``copy.copy`` leaves out."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
+        vars(other).pop("_thawed", None)
         return other
 
     def on_mesh(self, mesh: Places) -> tuple[Self, Carrier]:
@@ -259,12 +262,12 @@ class Collocation(Composed):
     @functools.cached_property
     def _field(self) -> Batch:
         """Right-hand side and integrands, compiled."""
-        return self._batch("field", ("states", "integrals"))
+        return self._frozen("field", self._batch("field", ("states", "integrals")))
 
     @functools.cached_property
     def _boundary(self) -> Batch:
         """Boundary conditions, compiled."""
-        return self._batch("boundary", ("boundary",))
+        return self._frozen("boundary", self._batch("boundary", ("boundary",)))
 
     _functions = "field", "boundary"
 
@@ -447,6 +450,10 @@ class Collocation(Composed):
         ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
         field = self._field.jacobian(*self._inside(x), of_field)[1][:, self._n :]
         return {"boundary": np.abs(ends).max(axis=1, initial=0.0), "integrals": np.abs(field).max(axis=(0, 2), initial=0.0)}
+
+    def slopes(self, x: Array) -> Array:
+        """Return the gradients of a few random combinations of the equations, which show what outcomes change."""
+        return np.array([self.transposed_product(x, w) for w in random_rows(draws.DRAWS, self.equations)])
 
     def _to_nodes(self, slopes: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""

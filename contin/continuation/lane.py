@@ -21,7 +21,6 @@ from contin.collocation.defect import estimate, estimate_of
 from contin.continuation import plain_on_mesh as on_mesh
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, Rooms, plain_steps
-from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
@@ -29,7 +28,6 @@ from contin.core.step import State
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint
-from contin.events.corner import comes_near
 from contin.events.crossings import changes_little
 from contin.events.inspection import Start, crossed, free_of, jumped, returned
 from contin.events.spectra import spectra_of
@@ -158,8 +156,6 @@ class Lane(ABC):
     def _passes(self, before: Trial, trial: Trial) -> bool:
         """Return whether a step passes a zero of other test functions, a change of the index, or the trivial branch."""
         if any(test.passed(before.value(test), trial.value(test)) for test in self._others):
-            return True
-        if any(test.label == Label.CORNER and comes_near(test, before, trial) for test in self._others):
             return True
         if self._index is not None and abs(before.value(self._index) - trial.value(self._index)) > 0:
             return True

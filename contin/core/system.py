@@ -9,6 +9,7 @@ problem. Scales are powers of two: multiplication by them is exact.
 
 from __future__ import annotations
 
+import copy
 import functools
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +26,7 @@ from contin.core.protocol import Carrier, Discretization
 from contin.draws import ASIDE
 from contin.errors import ProblemError
 from contin.functions.batch import Batch, Columns
+from contin.functions.origin import source
 from contin.levels import LAST_PLACES
 from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
@@ -455,15 +457,81 @@ class Composed(System):
         """Return the weights of the functionals in one of them."""
         return np.array([float(other == name) for other in self.integrated])
 
+    # --- conditions that unknowns decide ---------------------------------------------------------------------------
+
+    def _origins(self, name: str) -> tuple[int, ...]:
+        """Return the conditions of one of the functions; along t, those on parameters alone."""
+        return self.problem.batch(name).conditions(self._free, name == "field")
+
+    @functools.cached_property
+    def conditions(self) -> int:  # type: ignore[override]
+        """Their number."""
+        return sum(len(self._origins(name)) for name in self._functions)
+
+    def written(self, k: int) -> str:
+        """Return what the user has written for a condition or, where that is not known, the number that decides it."""
+        name, at = [(name, at) for name in self._functions for at in range(len(self._origins(name)))][k]
+        batch, origins, states = self.problem.batch(name), self._origins(name), self.problem.states
+        if known := source(batch, origins[at]):
+            return known
+        labels = [f"{end}.{state}" for end in "ab" for state in states] if batch.signature.ends else states
+        numbers = batch.frozen(self._free, np.ones(len(origins)), name == "field")[1]
+        return numbers.text([*labels, *self.problem.parameters])[at - len(origins)]
+
+    def with_sides(self, sides: Array) -> Self:
+        """Return the same with frozen outcomes; with none, the equations as they are."""
+        other = copy.copy(self)  # without what was computed
+        other.sides = sides
+        return other
+
+    @property
+    def thawed(self) -> Any:
+        """The equations as they are."""
+        return self._thawed if self.sides.size else self
+
+    @functools.cached_property
+    def _thawed(self) -> Any:
+        return self.with_sides(np.empty(0))
+
+    def _frozen(self, name: str, batch: Batch, which: int = 0) -> Any:
+        """Return one of the functions with these outcomes or, with 1, the numbers that decide."""
+        if not self.sides.size or not (count := len(self._origins(name))):
+            return batch
+        first = sum(len(self._origins(other)) for other in self._functions[: self._functions.index(name)])
+        return batch.frozen(self._free, self.sides[first : first + count], name == "field")[which]
+
+    @functools.cached_property
+    def unscaled(self) -> Batch:
+        """The last of the functions, in the user's units."""
+        name = self._functions[-1]
+        return self._frozen(name, self.problem.batch(name))
+
+    @functools.cached_property
+    def _deciding(self) -> list[tuple[int, Any]]:
+        """The numbers that decide: places of functions, and theirs."""
+        names = [(at, name) for at, name in enumerate(self._functions) if self._origins(name)]
+        return [(at, self._frozen(name, self._batch(name), 1)) for at, name in names]
+
+    def numbers(self, x: Array) -> tuple[Array, Array]:
+        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
+        terms, found, rows = self._terms, list[Array](), list[Array]()
+        for at, batch in self._deciding:
+            values, slopes = batch.jacobian(*terms[at].inputs(x), batch.columns(self._free))
+            found.append(values[0])
+            rows += [terms[at].by_x(slopes[:, k]) / len(values) for k in range(batch.count)]  # along t they are all alike
+        return np.concatenate(found), np.array(rows)
+
     # --- the same with other parameters and sizes -----------------------------------------------------------------
 
     #: Mesh and degree, of kinds that have them.
     _grid: tuple[Any, ...] = ()
 
     def _with(self, **changes: object) -> Self:
-        """Return the same with other free parameters, parameters or scales."""
+        """Return the same with other free parameters, parameters or scales; with frozen outcomes if these are the same."""
         given: dict[str, Any] = {"free": self.free, "parameters": self._values, "scales": self.scales, **changes}
-        return type(self)(self.problem, *self._grid, **given)
+        other = type(self)(self.problem, *self._grid, **given)
+        other.sides = self.sides if (other.free, other.size) == (self.free, self.size) else other.sides
+        return other
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         return self._with(parameters=self._values | dict(values))

@@ -137,20 +137,33 @@ class MapSystem(OfCycles, Algebraic):
     @functools.cached_property
     def _residual(self) -> Any:
         """The map; where outcomes are frozen, those of each point."""
-        return self._frozen(0) if self.sides.size else self.problem.batch("map")
+        return self._frozen("map", self.problem.batch("map"))
 
-    @functools.cached_property
-    def _deciding(self) -> Any:
-        return self._frozen(1)
-
-    def _frozen(self, which: int) -> Any:
-        every = [self.problem.batch("map").frozen(self._free, sides)[which] for sides in self.sides.reshape(self.rounds, -1)]
+    def _frozen(self, name: str, batch: Batch, which: int = 0) -> Any:
+        if not self.sides.size:
+            return batch
+        every = [batch.frozen(self._free, sides)[which] for sides in self.sides.reshape(self.rounds, -1)]
         return every[0] if self.rounds == 1 else _Pointwise(every)
 
     @functools.cached_property
     def conditions(self) -> int:  # type: ignore[override]
         """Their number, at all points."""
         return self.rounds * len(self.problem.batch("map").conditions(self._free)) if type(self) is MapSystem else 0
+
+    def written(self, k: int) -> str:
+        """Return what the user has written for a condition and, where there are several points, at which it is."""
+        point, origin = divmod(k, self.conditions // self.rounds)
+        return super().written(origin) + (f" at point {point + 1}" if self.rounds > 1 else "")
+
+    def numbers(self, x: Array) -> tuple[Array, Array]:
+        """Return the numbers that decide at all points, and their derivatives by x."""
+        ((_, deciding),) = self._deciding
+        values, slopes = deciding.jacobian(*self._terms[0].inputs(x), deciding.columns(self._free))
+        found, n = np.zeros((*values.shape, self.size)), self._n
+        found[..., self.state_size :] = slopes[:, :, n:]
+        for at, each in enumerate(slopes):
+            found[at, :, at * n : (at + 1) * n] = each[:, :n]
+        return values.ravel(), found.reshape(-1, self.size)
 
     def _by_x(self, slopes: Array) -> Array:
         first, last = slopes[:, : self._n].ravel(), np.add.reduce(slopes[:, self._n :])

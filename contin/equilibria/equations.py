@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -31,7 +31,6 @@ from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
 from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
 from contin.functions.batch import Batch
-from contin.functions.origin import source
 from contin.levels import CERTAIN, CORRECTED, LOCATED
 from contin.linalg.blocks import MANY, Factors
 from contin.linalg.matrices import DenseFactors, SparseFactors, eigenvalues, nearest, rightmost
@@ -250,53 +249,12 @@ class Algebraic(Spectral, Composed):
     @functools.cached_property
     def _residual(self) -> Batch:
         """The residual, compiled."""
-        batch = self._batch("residual", ("residual",))
-        return batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
-
-    @functools.cached_property
-    def _unscaled(self) -> Batch:
-        """The residual in the user's units."""
-        batch = self.problem.batch("residual")
-        return batch.frozen(self._free, self.sides)[0] if self.sides.size else batch
-
-    # --- conditions that unknowns decide -------------------------------------------------------------------------
+        return self._frozen("residual", self._batch("residual", ("residual",)))
 
     @functools.cached_property
     def conditions(self) -> int:  # type: ignore[override]
         """Their number; none with a given Jacobian."""
-        taken = type(self) is Algebraic and self.problem.jacobian is None
-        return len(self.problem.batch("residual").conditions(self._free)) if taken else 0
-
-    def written(self, k: int) -> str:
-        """Return what the user has written for a condition and, where there are several points, at which it is."""
-        batch = self.problem.batch(self._functions[0])
-        point, origin = divmod(k, len(origins := batch.conditions(self._free)))
-        return source(batch, origins[origin]) + (f" at point {point + 1}" if self.rounds > 1 else "")
-
-    def with_sides(self, sides: Array) -> Algebraic:
-        """Return the same with frozen outcomes; with none, the equations as they are."""
-        other = self._with()
-        other.sides = sides
-        return other
-
-    @functools.cached_property
-    def thawed(self) -> Algebraic:
-        """The equations as they are."""
-        return self.with_sides(np.empty(0)) if self.sides.size else self
-
-    def numbers(self, x: Array) -> tuple[Array, Array]:
-        """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
-        values, slopes = self._deciding.jacobian(*self._terms[0].inputs(x), self._deciding.columns(self._free))
-        found, n = np.zeros((*values.shape, self.size)), self.state_size // self.rounds
-        found[..., self.state_size :] = slopes[:, :, n:]
-        for at, each in enumerate(slopes):
-            found[at, :, at * n : (at + 1) * n] = each[:, :n]
-        return values.ravel(), found.reshape(-1, self.size)
-
-    @functools.cached_property
-    def _deciding(self) -> Batch:
-        """The numbers that decide."""
-        return self._batch("residual", ("residual",)).frozen(self._free, self.sides)[1]
+        return super().conditions if type(self) is Algebraic and self.problem.jacobian is None else 0
 
     def slopes(self, x: Array) -> Array:
         """Return F_x, shape (equations, size)."""
@@ -412,7 +370,7 @@ class Algebraic(Spectral, Composed):
         p = self.all_parameters(x)
         if self.problem.jacobian is not None:
             return np.array([_dense(self.problem.jacobian_at(u, p)) for u in states])
-        return self._unscaled.jacobian(np.zeros(len(states)), states, self._none, p, self._unscaled.columns([]))[1]
+        return self.unscaled.jacobian(np.zeros(len(states)), states, self._none, p, self.unscaled.columns([]))[1]
 
     def field_jacobian(self, x: Array) -> Array:
         """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
@@ -458,12 +416,6 @@ class Algebraic(Spectral, Composed):
         """Return the largest entries of each row."""
         found = abs(self._jacobian(x)[1])
         return {"residual": found.max(axis=1).toarray().ravel() if self.is_sparse else found.max(axis=1, initial=0.0)}
-
-    def _with(self, **changes: object) -> Self:
-        """Return the same with other free parameters, parameters or scales; with frozen outcomes if these are the same."""
-        other = super()._with(**changes)
-        other.sides = self.sides if (other.free, other.size) == (self.free, self.size) else other.sides
-        return other
 
     def carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns to another system of this problem."""

@@ -56,6 +56,9 @@ class Corner(Finding):
     unstable: tuple[int | None, int | None]
     nullity = 0
 
+    def __repr__(self) -> str:
+        return f"Corner({self.kind!r}, {len(self.ways)} way{'s' * (len(self.ways) != 1)}, unstable {self.unstable})"
+
     @property
     def is_branch_point(self) -> bool:  # type: ignore[override]
         """Several ways lead on."""
@@ -162,7 +165,8 @@ def refrozen(trial: Trial) -> Any:
     there = with_outcomes(system, x)
     ours, theirs = system.slopes(x), there.slopes(x)
     level = _level(np.abs(theirs).max(axis=0), x, CERTAIN * CORRECTED)
-    same = np.abs(there.residual(x)).max() <= level and np.abs(theirs - ours).max() <= LOCATED * np.abs(theirs).max()
+    gap = np.abs(there.residual(x) - system.residual(x)).max()
+    same = gap <= level and np.abs(theirs - ours).max() <= LOCATED * np.abs(theirs).max()
     return there if same else None
 
 
@@ -174,7 +178,7 @@ def zeros(system: Any, x: Array) -> list[int]:
 
 def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
     """Return the ways that leave x with any outcomes of conditions, why some have none, and whether slopes jump."""
-    found, missing, slopes, noise = list[Way](), "", list[Array](), np.zeros(1)
+    found, missing, slopes, noise, residual = list[Way](), "", list[Array](), np.zeros(1), system.residual(x)
     held, few = system.sides[list(zero)], len(zero) <= _MOST
     for sides in (
         itertools.product((1.0, -1.0), repeat=len(zero)) if few else (held, -held, *held * (1 - 2 * np.eye(len(zero))))
@@ -185,7 +189,7 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
             if not all(np.isfinite(each).all() for each in (jacobian, *map(there.slopes, _beside(x, LOCATED)))):
                 missing = "derivatives are not finite"  # as those of a root that begins there
                 continue
-            if np.abs(there.residual(x)).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
+            if np.abs(there.residual(x) - residual).max() > _level(np.abs(jacobian).max(axis=0), x, DOUBLED):
                 missing = "the equations jump"
                 continue
             slopes.append(jacobian)
@@ -209,9 +213,12 @@ def _beside(x: Array, part: float) -> Array:
 def _tangents(system: Any, x: Array) -> list[Array]:
     """Return the unit tangents at x, both ways; where two branches cross with these outcomes, those of both."""
     slopes = [each for each in map(system.slopes, (x, *_beside(x, ROUGH))) if np.isfinite(each).all()]
-    if np.linalg.svd(slopes[0], compute_uv=False)[-1] > LOCATED * max(np.linalg.norm(each) for each in slopes):
-        row = random_rows(1, system.size)[0] * np.sqrt(system.weights)
-        found = [linearization(system, x, row).tangent]
+    row, any_way = random_rows(2, system.size) * np.sqrt(system.weights)
+    with np.errstate(all="ignore"):
+        linear = linearization(system, x, row)
+        response: Any = linear.factors and np.abs(linear.factors.solve(any_way)).max()
+    if response * LOCATED * max(np.linalg.norm(each) for each in slopes) < np.linalg.norm(any_way):
+        found = [linear.tangent]
     else:
         try:
             point = locate_branch_point(system, x)

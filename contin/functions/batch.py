@@ -90,21 +90,22 @@ class Recorded:
         found.recording, found.kept, found._seconds, found._sides = recording, {}, {}, sides
         return found
 
-    def outcomes(self, free: tuple[int, ...]) -> Outcomes:
-        """Return the functions with frozen outcomes of what states or ``free`` parameters decide."""
+    def outcomes(self, free: tuple[int, ...], along: bool = False) -> Outcomes:
+        """Return the functions with frozen outcomes of what states or ``free`` parameters decide, ``along`` t these alone."""
         recording, states = self.recording, len(self._signature.states) * (1 + self._signature.ends)
-        moving = [*recording.inputs[:states], *(recording.inputs[states + slot] for slot in free)]
-        return self._once(("outcomes", free), lambda: frozen(recording.tape, recording.results, moving))
+        own, moving = recording.inputs[:states], [recording.inputs[states + slot] for slot in free]
+        both = (moving, [recording.time, *own]) if along else ([*own, *moving], [])
+        return self._once(("outcomes", free, along), lambda: frozen(recording.tape, recording.results, *both))
 
-    def frozen(self, free: tuple[int, ...], sides: Array) -> tuple[Recorded, Recorded]:
+    def frozen(self, free: tuple[int, ...], sides: Array, along: bool = False) -> tuple[Recorded, Recorded]:
         """Return the same functions with these outcomes, and the numbers that decide."""
 
         def both() -> list[Recorded]:
-            found = self.outcomes(free)
+            found = self.outcomes(free, along)
             recordings = [replace(self.recording, results=places) for places in (found.results, found.numbers)]
             return [self._of(recording, len(found.numbers)) for recording in recordings]
 
-        functions, numbers = map(copy.copy, self._once(("frozen", free), both))
+        functions, numbers = map(copy.copy, self._once(("frozen", free, along), both))
         functions._behind = numbers._behind = np.concatenate([sides, self._behind])
         return functions, numbers
 
@@ -594,15 +595,18 @@ class Batch:
         found._own = self._own.sized(inputs, values)
         return found
 
-    def conditions(self, free: Sequence[int] | Indices) -> tuple[int, ...]:
-        """Return the places on the tape of the conditions that states or ``free`` parameters decide."""
-        return self.recorded.outcomes(tuple(map(int, free))).origins if self.recorded is not None else ()
+    def conditions(self, free: Sequence[int] | Indices, along: bool = False) -> tuple[int, ...]:
+        """Return the places on the tape of the conditions that states or ``free`` parameters decide.
 
-    def frozen(self, free: Sequence[int] | Indices, sides: Array) -> tuple[Batch, Batch]:
+        ``along`` t, those that parameters alone decide: others have an outcome at each place.
+        """
+        return self.recorded.outcomes(tuple(map(int, free)), along).origins if self.recorded is not None else ()
+
+    def frozen(self, free: Sequence[int] | Indices, sides: Array, along: bool = False) -> tuple[Batch, Batch]:
         """Return the functions with ``sides``, 1 or -1 each, as outcomes of these conditions, and the numbers that decide."""
         assert self.recorded is not None
         made = copy.copy(self), copy.copy(self)
-        for batch, own in zip(made, self.recorded.frozen(tuple(map(int, free)), sides)):
+        for batch, own in zip(made, self.recorded.frozen(tuple(map(int, free)), sides, along)):
             batch._own, batch.count = own, len(own.recording.results)
             vars(batch).pop("depends", None)
         return made

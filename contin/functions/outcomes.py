@@ -11,6 +11,9 @@ from typing import NamedTuple
 
 from contin.functions.tape import Tape
 
+#: Operations that a number's sign decides.
+_DECIDED = ("lt", "le", "abs", "sign")
+
 
 class Outcomes(NamedTuple):
     """Functions with outcomes as inputs ``("side", k)``, by places on their tape.
@@ -30,8 +33,10 @@ class Outcomes(NamedTuple):
     origins: tuple[int, ...]
 
 
-def frozen(tape: Tape, results: Sequence[int], moving: Collection[int]) -> Outcomes:
+def frozen(tape: Tape, results: Sequence[int], moving: Collection[int], along: Collection[int] = ()) -> Outcomes:
     """Return functions in which every ``abs``, ``sign`` and comparison that depends on ``moving`` inputs is decided by a side.
+
+    But for those that depend on inputs ``along`` t: they have an outcome at each place.
 
     Conditions inside of what is found by iteration stay as they are.
 
@@ -43,7 +48,10 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int]) -> Outco
     >>> tape.lines([*found.results, *found.numbers], {x.place: "x", tape.input(("side", 0)).place: "side"})
     ['(x - 1) * side', 'x - 1']
     """
+    if not any(operation.name in _DECIDED for operation in tape.operations):
+        return Outcomes(tuple(results), (), ())
     moves, zero = tape.reading([*results, *moving], moving), tape.constant(0.0)
+    varies = tape.reading([*results, *along], along)
     moved: dict[int, int] = {}
     known: dict[int, int] = {}
     numbers, origins = list[int](), list[int]()
@@ -62,9 +70,11 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int]) -> Outco
     for place in tape.needed(results):
         name, operands, data = tape.operations[place]
         new = tuple(moved[operand] for operand in operands)
-        if moves[place] and name in ("lt", "le"):
+        if varies[place] or not moves[place]:
+            moved[place] = place if new == operands else tape.at(name, new, data)
+        elif name in ("lt", "le"):
             moved[place] = tape.at("lt", (side(tape.at("sub", new), place), zero))
-        elif moves[place] and name in ("abs", "sign"):
+        elif name in ("abs", "sign"):
             held = side(new[0], place)
             moved[place] = tape.at("mul", (held, new[0])) if name == "abs" else held
         else:

@@ -1,12 +1,15 @@
 """Corners of branches: closed forms, and random piecewise-linear systems whose branches are enumerated region by region."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import contin
-from contin import AlgebraicProblem, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, Segment, SegmentedProblem, solve, trace
 
 
 def corners(branch):
@@ -137,6 +140,96 @@ def test_a_solution_beyond_a_jump_is_not_made_up(guess):
         solve(problem, [guess])
 
 
+# --- conditions at ends ------------------------------------------------------------------------------------------------
+
+
+def tip_load(depth):
+    """Return the load across the tip of a clamped elastica of length 1 that moves it by a depth (Bisshopp & Drucker 1945)."""
+
+    def depth_at(m):
+        begin = np.arcsin(1 / np.sqrt(2 * m))
+        return 1 - 2 * (ellipe(m) - ellipeinc(begin, m)) / (ellipk(m) - ellipkinc(begin, m)) - depth
+
+    m = brentq(depth_at, 0.5 + 1e-9, 0.9, xtol=1e-15)
+    return (ellipk(m) - ellipkinc(np.arcsin(1 / np.sqrt(2 * m)), m)) ** 2
+
+
+def cantilever(ends, length=1.0, load=1.0, **at):
+    """A clamped elastica of this length, in units of load; the tip's load P less the stop's force R, in these units."""
+
+    def rates(t, u, p):
+        return length * math.sin(u.th), u.m, (p.P - p.R) / load * math.cos(u.th)
+
+    return BoundaryValueProblem(rates, ends, ["y", "th", "m"], {"P": 0.1 * load, "R": 0.0, **at})
+
+
+@pytest.mark.parametrize(["length", "load"], [(1, 1), (1e3, 1), (1e-3, 1), (1, 1e3), (1, 1e-3)])
+def test_a_tip_meets_a_stop(length, load):
+    """At the load of the free tip; behind it the stop carries what is more, and at twice the depth below it none."""
+    problem = cantilever(lambda a, b, p: (a.y, a.th, b.m, min(b.y + 0.2 * length, p.R)), length, load)
+    branch = trace(solve(problem, [0.0] * 3, free=["R"]), free=["P", "R"], limits={"P": (0, 5 * load)})
+    (corner,) = branch.labelled("BC")
+    wanted = tip_load(0.2)
+    assert abs(corner["P"] - load * wanted) <= corner.errors["P"] + 1e-13 * load
+    assert corner.details.kind == "goes on" and corner.name.startswith("min(b.y + 0.2 * length, p.R), line ")
+    assert branch[-1]["P"] == 5 * load and branch[-1]["R"] == pytest.approx(load * (5 - wanted), rel=1e-11) and not branch.notes
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_walls_on_both_sides(sense):
+    problem = cantilever(lambda a, b, p: (a.y, a.th, b.m, max(min(b.y + 0.2, p.R), b.y - 0.2)), P=0.0)
+    first = solve(problem, [0.0] * 3, free=["R"])
+    branch = trace(first, free=["P", "R"], limits={"P": (-3, 3)}, direction=sense)
+    assert corners(branch) == [(round(sense * tip_load(0.2), 9), "goes on")] and branch[-1]["P"] == 3 * sense
+
+
+def test_two_tips_meet_their_stops_at_once():
+    def rates(t, u, p):
+        return math.sin(u.a), u.m, (p.P - p.R) * math.cos(u.a), math.sin(u.b), u.n, (p.P - p.S) * math.cos(u.b)
+
+    def ends(a, b, p):
+        return a.y, a.a, b.m, min(b.y + 0.2, p.R), a.z, a.b, b.n, min(b.z + 0.2, p.S)
+
+    problem = BoundaryValueProblem(rates, ends, ["y", "a", "m", "z", "b", "n"], {"P": 0.1, "R": 0.0, "S": 0.0})
+    branch = trace(solve(problem, [0.0] * 6, free=["R", "S"]), free=["P", "R", "S"], limits={"P": (0, 5)})
+    (corner,) = branch.labelled("BC")
+    assert corner["P"] == pytest.approx(tip_load(0.2)) and "p.R" in corner.name and "p.S" in corner.name
+    assert branch[-1]["R"] == pytest.approx(branch[-1]["S"]) == pytest.approx(5 - tip_load(0.2))
+
+
+def test_a_spring_at_a_joint_that_only_pushes():
+    """It begins to push where the joint of the rod without it is as low."""
+
+    def ends(a, b, p):
+        force = p.k * max(0, -0.05 - b[0].y)
+        joint = b[0].y - a[1].y, b[0].th - a[1].th, b[0].m - a[1].m, b[0].q - a[1].q + force
+        return a[0].y, a[0].th, b[1].m, b[1].q - p.P, *joint
+
+    half = Segment(lambda s, u, p: (math.sin(u.th), u.m, u.q * math.cos(u.th), 0.0), ["y", "th", "m", "q"], length=0.5)
+    problem = SegmentedProblem([half, half], ends, {"P": 0.1, "k": 50.0})
+    branch = trace(solve(problem, [0.0] * 8), free=["P"], limits={"P": (0, 5)})
+    (corner,) = branch.labelled("BC")
+    free = solve(problem, [0.0] * 8, {"P": corner["P"], "k": 0.0}).segment(0)
+    assert free["y"][-1] == pytest.approx(-0.05, abs=1e-11) and branch[-1]["P"] == 5
+
+
+def test_conditions_on_parameters_alone_are_corners_of_solutions_and_of_cycles():
+    """The load is |P|: the elastica comes back to where it was. The damping of van der Pol's oscillator begins to grow."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (math.sin(u.th), u.m, abs(p.P) * math.cos(u.th)),
+        lambda a, b, p: (a.y, a.th, b.m), ["y", "th", "m"], {"P": 1.0},
+    )  # fmt: skip
+    branch = trace(solve(problem, [0.0] * 3), free=["P"], limits={"P": (-1, 2)}, direction=-1)
+    assert corners(branch) == [(0, "goes on")] and branch[-1].x[-4] == pytest.approx(branch[0].x[-4], abs=1e-11)
+    field = contin.CycleProblem(
+        lambda u, p: (u.y, max(p.m, 0.5) * (1 - u.x**2) * u.y - u.x), ["x", "y"], {"m": 0.2},
+    )  # fmt: skip
+    round_ = solve(field, lambda t: (2 * math.cos(2 * math.pi * t), -2 * math.sin(2 * math.pi * t)))
+    branch = trace(round_, free=["m"], limits={"m": (0.1, 1)})
+    assert corners(branch) == [(0.5, "goes on")] and branch[-1]["m"] == 1
+    assert branch[-1]["period"] == pytest.approx(6.6632868593, abs=1e-9)  # mu = 1 (Andersen & Geer 1982)
+
+
 # --- random piecewise-linear systems -----------------------------------------------------------------------------------
 
 #: The parameter is followed between these ends.
@@ -220,22 +313,28 @@ def distance(ends, z):
     return np.abs(ends[0] + part * along - z).max()
 
 
-def agree(system):
-    """Compare runs both ways from the middle of a segment near z with the walk along segments."""
+def agree(system, at_ends=False):
+    """Compare runs both ways from the middle of a segment near z with the walk along segments; ``at_ends`` of a domain."""
     pieces = list(system.pieces())
     if not pieces:
         pytest.skip("the solution is isolated")
     start, end = min(pieces, key=lambda ends: distance(ends, system.z))
     z = start + 0.37 * (end - start)
     problem = AlgebraicProblem(system.residual, [f"x{i}" for i in range(system.n)], {"a": float(z[-1])}, dynamics=False)
+    if at_ends:  # states that are constant, of which some are held at one end and some at the other
+        problem = BoundaryValueProblem(
+            lambda t, u, p: [0.0 * x for x in u],
+            lambda a, b, p: system.residual([(a, b)[i % 2][i] for i in range(system.n)], p),
+            problem.states, problem.parameters, functionals={f"x{i}": lambda t, u, p, i=i: u[i] for i in range(system.n)},
+        )  # fmt: skip
     first = solve(problem, z[:-1])
-    assert first.x == pytest.approx(z[:-1], abs=1e-9)
+    assert first.x[: system.n] == pytest.approx(z[:-1], abs=1e-9)
     for sense in (1, -1):
         branch = trace(first, free=["a"], direction=sense, limits={"a": (-LIMIT, LIMIT)})
         places, ways = expected(pieces, z, sense)
         met = branch.labelled("BC")[: len(places)]
         assert [len(point.details.ways) for point in met] == ways
-        names = [*problem.states, "a"]
+        names = [*(f"x{i}" for i in range(system.n)), "a"]
         assert all([point[name] for name in names] == pytest.approx(place, abs=1e-9) for point, place in zip(met, places))
         assert branch.stop.reason in ("limit", "closed", "known branch") and {point.label for point in branch} <= {
             "",
@@ -248,6 +347,12 @@ def agree(system):
 @pytest.mark.parametrize("seed", range(200))
 def test_random_systems(seed):
     agree(Linear(seed))
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("seed", range(40))
+def test_random_systems_at_ends(seed):
+    agree(Linear(seed, meet=2 * (seed % 2)), at_ends=True)
 
 
 @pytest.mark.sample(10)
