@@ -4,9 +4,9 @@ With the Hamiltonian H = lambda.f - L - mu.g at the controls w that maximize it,
 
     x' = dH/dlambda,   lambda' = -dH/dx,   0 = dH/dw,
 
-and at the ends lambda(t0) = d(Phi + sigma.e)/dx(t0), lambda(t1) = -d(Phi + sigma.e)/dx(t1). Where H is quadratic in w, the
-controls are eliminated on the tape; else they are found at each point as the minimum of -H, with exact derivatives
-(`contin.functions.iteration`).
+and at the ends lambda(t0) = d(Phi + sigma.e)/dx(t0), lambda(t1) = -d(Phi + sigma.e)/dx(t1). Contacts, which push, have
+min(e, -sigma) = 0 in the place of e = 0. Where H is quadratic in w, the controls are eliminated on the tape; else they are
+found at each point as the minimum of -H, with exact derivatives (`contin.functions.iteration`).
 
 Loads without an energy, as they are at the states x, do the work W(x; y) on states y. With Q the derivative of W by y at y = x,
 lambda' is less by Q, lambda(t0) less by Q0, and lambda(t1) more by Q1.
@@ -55,6 +55,7 @@ class Variation:
     starts: tuple[float, ...]
     work: Function | None = None
     end_work: Function | None = None
+    pushes: Mapping[int, str] = dataclasses.field(default_factory=dict)
 
     __repr__ = shown
 
@@ -343,11 +344,14 @@ class EndConditions:
         self.slopes = _derivatives(tape, self.conditions, self.places)
         self._check()
         fixed: tuple[list[int], list[int]] = ([], [])
-        free = []
+        free: dict[int, Number] = {}
+        for number in v.pushes:
+            if number >= len(self.conditions):
+                raise ProblemError(f"pushes: {number} is not the number of an end condition, 0 to {len(self.conditions) - 1}")
         for number, condition in enumerate(self.conditions):
-            place = self._fixes(number)
+            place = None if number in v.pushes else self._fixes(number)
             if place is None:
-                free.append(condition)
+                free[number] = condition
             elif place[1] in fixed[place[0]]:
                 end, state = ("first", "last")[place[0]], v.states[place[1]]
                 raise ProblemError(f"ends: condition {number + 1} fixes {state} at the {end} end, which another one does")
@@ -357,28 +361,31 @@ class EndConditions:
         self.parameters += tuple(f"sigma_{i + 1}" for i in range(len(free)))
         sigma = [tape.input(4 * n + len(self.p) + i) for i in range(len(free))]
         self.p += sigma
-        potential = sum((s * condition for s, condition in zip(sigma, free)), energy[0] if energy else tape.number(0.0))
+        own = energy[0] if energy else tape.number(0.0)
+        potential = sum((s * condition for s, condition in zip(sigma, free.values())), own)
         (by,) = _derivatives(tape, [potential], self.places)
         if v.end_work is not None:
             pulls = _pulls(tape, "end_work", v.end_work, [], [(v.states, self.a[:n]), (v.states, self.b[:n])], given[2:])
             by = [slope - pull for slope, pull in zip(by, pulls)]
         starting, ending = self.a[n:], self.b[n:]
         self.values = [*self.conditions]
+        for number in v.pushes:
+            gap, force = self.conditions[number], -dict(zip(free, sigma))[number]
+            self.values[number] = tape.apply("select", gap - force < 0, gap, force)
         self.values += [starting[i] - by[i] for i in range(n) if i not in fixed[0]]
         self.values += [ending[i] + by[n + i] for i in range(n) if i not in fixed[1]]
 
     def _check(self) -> None:
         """Raise ProblemError for end conditions without a state, and for those linear ones that depend on others."""
-        if len(self.conditions) > len(self.places):
-            raise ProblemError(
-                f"ends returns {len(self.conditions)} conditions, {len(self.places)} fix all states at both ends"
-            )
+        held = len(self.conditions) - len(self.variation.pushes)
+        if held > len(self.places):
+            raise ProblemError(f"ends returns {held} conditions, {len(self.places)} fix all states at both ends")
         independent: list[list[float]] = []
         for number, row in enumerate(self.slopes):
             known = [slope.known for slope in row]
             if not any(value is None or value for value in known):
                 raise ProblemError(f"ends: condition {number + 1} depends on no state")
-            if None not in known:
+            if None not in known and number not in self.variation.pushes:
                 independent.append([float(value or 0.0) for value in known])
                 if np.linalg.matrix_rank(np.array(independent)) < len(independent):
                     raise ProblemError(f"ends: condition {number + 1} repeats or contradicts those before it")

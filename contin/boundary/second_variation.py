@@ -32,12 +32,13 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import interpolation
+from contin.core.differences import derivative
 from contin.core.labels import Label
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability, nullity_of
-from contin.levels import DEPENDENT, LOCATED, ROUGH, ROUND_OFF
+from contin.levels import APART, DEPENDENT, LOCATED, ROUGH, ROUND_OFF
 from contin.linalg.orientation import canonical_basis
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
@@ -154,6 +155,35 @@ def legendre() -> Event:
         return value if np.isfinite(value) else 1.0
 
     return Event("EP", "loss of convexity in the controls (Legendre's condition)", margin, terminal=True)
+
+
+def lies_flat(number: int, name: str) -> Event:
+    """Return the test function that ends a run where a strip lies flat at what it touches along its direction.
+
+    It is the second derivative of the gap along the strip: where it is negative, more than this point would touch.
+    """
+
+    def bends_away(trial: Trial) -> float:
+        system, n, p = trial.system, trial.system.problem.dimension, trial.system.all_parameters(trial.x)
+        ends, batch, field = system.states(trial.x)[[0, -1]], system.unscaled, system.problem.batch("field")
+        inside = system.states_at_gauss_points(trial.x)
+        largest = np.abs(field.values(system.gauss_times, inside, inside[:0], p)[:, :n]).max(axis=0)
+
+        def at(s: float, end: int, along: Array) -> tuple[Array, Array]:
+            """Return rates of the states, and derivatives of the gap by x, a way further along the strip."""
+            there = ends + s * along
+            jacobian = batch.jacobian(np.zeros(1), there[:1], there[1:], p, batch.columns([]))[1][0]
+            rates = field.values(system.mesh[[-end]] + s, there[[end]], there[:0], p)[0, : ends.shape[1]]
+            return rates, jacobian[number, : 2 * ends.shape[1]].reshape(2, -1)[end, :n]
+
+        for end in (0, 1):
+            along = np.zeros_like(ends)
+            along[end], row = at(0.0, end, along)
+            if row.any() and abs(row @ along[end, :n]) <= APART * np.abs(row) @ largest:
+                return float(derivative(lambda s: np.dot(*(each[:n] for each in at(s, end, along))))[0])  # noqa: B023
+        return 1.0
+
+    return Event("EP", f"flat contact at {name}: beyond it a line touches, which is not followed", bends_away, terminal=True)
 
 
 def _convexity(hll: Array) -> float:
@@ -497,4 +527,5 @@ def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     second /= np.tile(sizes[n:], 2)[:, None]
     held = [i for places, offset in zip(fixed, (0, n)) for i in (offset + place for place in places)]
     second[:, held] = 0.0  # they do not move
-    return by_ends[:conditions], (second + second.T) / 2
+    open_ones = [i for i in problem.variation.pushes if not by_ends[i].any()]
+    return np.delete(by_ends[:conditions], open_ones, axis=0), (second + second.T) / 2

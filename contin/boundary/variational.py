@@ -21,18 +21,19 @@ from contin import errors as checks
 from contin.arrays import Array, Function
 from contin.boundary import statement
 from contin.boundary.canonical import Canonical, EndConditions, Variation, canonical
-from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, second_variation, stability_of
+from contin.boundary.second_variation import INDEX, Symmetry, degeneracy, legendre, lies_flat, second_variation, stability_of
 from contin.boundary.statement import BoundaryValueProblem, InSegments, Piece, Quantity, between, joint_names
 from contin.boundary.system import Collocation
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import SpecialPoint
+from contin.events.corner import with_outcomes
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
 from contin.levels import LOCATED
 from contin.problems.rewriting import of_parameters
-from contin.problems.statement import check_statement, portable
+from contin.problems.statement import MOST_CONDITIONS, check_statement, portable
 from contin.text import shown
 
 
@@ -86,6 +87,14 @@ class VariationalProblem(BoundaryValueProblem):
         such loads have no index.
     end_work : callable, optional
         ``end_work(x0, x1, y0, y1, p)``: the same at the ends.
+    pushes : sequence of int, or mapping of int to str, optional
+        Contacts: numbers, from 0, of those ``ends`` that are gaps e >= 0, and names for them. Each has a multiplier ``sigma``,
+        and the force -sigma >= 0, which pushes; one of both is zero. Special points BC say which contact touches or lifts off;
+        the index counts what is free to move with the contacts that hold there (`contacts`). Where a strip touches along its
+        direction, as the middle of a column touches a wall, a run ends where it lies flat at the wall: lines of contact are not
+        followed.
+    points : sequence of int, optional
+        Those contacts that are points, as rollers are, which a strip may bend around.
 
     Raises
     ------
@@ -117,6 +126,7 @@ class VariationalProblem(BoundaryValueProblem):
 
     variation: Variation
     canonical: Canonical
+    points: tuple[int, ...] = ()
     symmetries: Mapping[str, Symmetry]
 
     @checks.arguments
@@ -127,7 +137,8 @@ class VariationalProblem(BoundaryValueProblem):
         functionals: Mapping[str, Function] | None = None, hamiltonian: Function | None = None,
         symmetries: Mapping[str, Symmetry] | None = None, domain: tuple[float, float] = (0.0, 1.0),
         starts: Mapping[str, float] | None = None, phases: Sequence[str] = (), sizes: Mapping[str, float] | None = None,
-        work: Function | None = None, end_work: Function | None = None,
+        work: Function | None = None, end_work: Function | None = None, pushes: Sequence[int] | Mapping[int, str] = (),
+        points: Sequence[int] = (),
     ) -> None:  # fmt: skip
         integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
         names = check_statement(states, parameters, functionals)
@@ -155,7 +166,9 @@ class VariationalProblem(BoundaryValueProblem):
         variation = Variation(
             energy, kinematics, ends, end_energy, hamiltonian, dict(integrals), dict(functionals), names, control_names,
             tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names), work, end_work,
+            _contacts(pushes, points),
         )  # fmt: skip
+        self._keep(points=tuple(points))
         phases = [f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held]
         self._derive(variation, canonical(variation), parameters, symmetries, phases, domain)
         self._keep(sizes=self._sized(sizes or {}))
@@ -198,8 +211,30 @@ class VariationalProblem(BoundaryValueProblem):
         }  # fmt: skip
 
     def events(self) -> list[Event]:
-        """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
-        return [legendre()]
+        """Return that of Legendre's condition, where the energy ceases to be convex in the controls, and those of contacts."""
+        names = dict(zip(self.variation.pushes, self.contacts.values()))
+        walls = (lies_flat(number, name) for number, name in names.items() if number not in self.points)
+        return [legendre(), *walls]
+
+    @functools.cached_property
+    def contacts(self) -> dict[int, str]:
+        """Names of contacts, by the place of what decides whether they hold among the recorded conditions."""
+        if not self.variation.pushes:
+            return {}
+        recorded: Any = self.batch("boundary").recorded
+        recording, found = recorded.recording, {}
+        labels = [*(f"{end}.{state}" for end in "ab" for state in self.state_names), *self.parameters]
+        for number, name in self.variation.pushes.items():
+            decides, gap, _ = recording.tape.operations[recording.results[number]].operands
+            found[decides] = name or recording.tape.lines([gap], dict(zip(recording.inputs, labels)))[-1]
+        return found
+
+    def touching(self, system: Collocation, x: Array) -> tuple[str, ...]:
+        """Return the names of the contacts that hold at a solution x."""
+        known = system if system.sides.size or not self.contacts else with_outcomes(system, x)
+        origins = self.batch("boundary").conditions(known._free)
+        sides = known.sides[known.sides.size - len(origins) :]
+        return tuple(self.contacts[origin] for origin, side in zip(origins, sides) if origin in self.contacts and side < 0)
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the second variation says of a solution."""
@@ -253,6 +288,19 @@ class VariationalProblem(BoundaryValueProblem):
             return math.inf
         values: Any = self.legendre.values(t, u, u[:0], p)
         return float(values.min())
+
+
+def _contacts(given: Sequence[int] | Mapping[int, str], points: Sequence[int]) -> dict[int, str]:
+    """Return the numbers of contacts, some of them ``points``, and their names; "" without one."""
+    names = dict(given) if isinstance(given, Mapping) else dict.fromkeys(given, "")
+    for number in names:
+        checks.whole("pushes", number, 0, MOST_CONDITIONS)
+    for number in points:
+        if number not in names:
+            raise ProblemError(
+                f"points: {number} must be one of the pushes: {checks.listed(map(str, names)) or 'there are none'}"
+            )
+    return names
 
 
 def _check_names(
@@ -371,6 +419,8 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
         `VariationalProblem`.
     sizes : mapping of str to float, optional
         Of all states and multipliers, and of parameters; see `VariationalProblem`.
+    pushes, points : optional
+        Contacts, numbers of conditions of ``ends``; see `VariationalProblem`.
 
     Raises
     ------
@@ -403,6 +453,7 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
         self, segments: Sequence[VariationalSegment], parameters: Mapping[str, float], *, ends: Function | None = None,
         end_energy: Function | None = None, symmetries: Mapping[str, Symmetry] | None = None, phases: Sequence[str] = (),
         sizes: Mapping[str, float] | None = None, end_work: Function | None = None,
+        pushes: Sequence[int] | Mapping[int, str] = (), points: Sequence[int] = (),
     ) -> None:  # fmt: skip
         given = tuple(checks.sequence("segments", segments, "VariationalSegment"))
         if not given:
@@ -418,6 +469,7 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
             None, None, ends and between(ends, pieces), end_energy and between(end_energy, pieces), None, {}, {}, names,
             joint_names([each.variation.controls for each in own]), tuple(parameters), (),
             next((each.work for each in given if each.work), None), end_work and _between_both(end_work, pieces),
+            _contacts(pushes, points),
         )  # fmt: skip
         at_ends = EndConditions(variation)
         with_multipliers = [each.with_multipliers(len(names)) for each in pieces]
@@ -427,7 +479,7 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
             at_ends.function(), None, statement.sums(columns, with_multipliers),
             _pivots([each.canonical.legendre for each in own], with_multipliers, count), at_ends.sigmas, at_ends.fixed,
         )  # fmt: skip
-        self._keep(segments=given, pieces=with_multipliers)
+        self._keep(segments=given, pieces=with_multipliers, points=tuple(points))
         phases = [f"lam_{name}" for name in checks.chosen("phases", phases, names)]
         self._derive(variation, derived, parameters, symmetries, phases)
         self._keep(sizes=self._sized(sizes or {}))

@@ -63,6 +63,13 @@ class Notes:
         elif doubt and not contradicts:
             self.inside(doubt, arc)
 
+    def contacts(self, trial: Trial) -> None:
+        """Note which contacts hold where a run begins, of a problem that has some."""
+        if known := getattr(trial.system.problem, "contacts", None):
+            held = trial.system.problem.touching(trial.system, trial.x)
+            states = [f"{name} {'holds' if name in held else 'is open'}" for name in known.values()]
+            self.add(f"contacts at {self.place(trial)}: {', '.join(states)}")
+
     def corners(self, trial: Trial) -> None:
         """Note once that conditions on states make the equations jump, and once that mesh points do not follow them."""
         tolerance = self.tolerance if self.moves else math.inf

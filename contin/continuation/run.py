@@ -32,7 +32,7 @@ from contin.core.step import Reason, State, Stop
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
-from contin.events.corner import conditions, corner_at, refrozen
+from contin.events.corner import Way, conditions, corner_at, refrozen
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.events.watch import Watch
@@ -151,6 +151,7 @@ class Continuation:
             first = SpecialPoint(0.0, Label.BRANCH_POINT if self.state.singular else Label.END, "start", trial)
             located = located_again(dataclasses.replace(first, label=trial.system.judged(first).label), self.settings)
             self._notes.corners(trial)
+            self._notes.contacts(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             self.stop = begins_outside(trial, self.settings, self._own, self.state.singular)
         while self.stop is None:
@@ -260,7 +261,7 @@ class Continuation:
         corner, ways = corner_at(point, came, self._conditions.index(point.test), self.primary)
         if corner is not None:
             self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=corner.name)
-            yield self._point(corner, state, accuracy=self._accuracy)
+            yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
         if ways:
             at, accepted = corner or point, state.accepted + 1
             behind = on_branch(ways[0].system, at.trial.x, ways[0].tangent, settings, False)
@@ -272,6 +273,14 @@ class Continuation:
             elif accepted >= settings.max_points:
                 self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[0])
             self._left.append(left)
+
+    def _index_across(self, corner: SpecialPoint, ways: list[Way]) -> IndexChange | None:
+        """Return the index before and behind a corner: what contacts hold does not move."""
+        if self._watch.index is None or not ways:
+            return None
+        both = (corner.trial, Trial.without_tangent(ways[0].system, corner.trial.x))
+        before, behind = (None if np.isnan(value := trial.value(self._watch.index)) else int(value) for trial in both)
+        return before, behind
 
     def _takes_shorter_steps(self) -> bool:
         """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""

@@ -468,10 +468,15 @@ class Composed(System):
         """Their number."""
         return sum(len(self._origins(name)) for name in self._functions)
 
-    def written(self, k: int) -> str:
-        """Return what the user has written for a condition or, where that is not known, the number that decides it."""
+    def written(self, k: int, side: float) -> str:
+        """Return what the user has written for a condition or, where that is not known, the number that decides it.
+
+        Of a contact, whether it touches or lifts off at this side.
+        """
         name, at = [(name, at) for name in self._functions for at in range(len(self._origins(name)))][k]
         batch, origins, states = self.problem.batch(name), self._origins(name), self.problem.states
+        if contact := getattr(self.problem, "contacts", {}).get(origins[at]) if batch.signature.ends else None:
+            return f"{contact} {'touches' if side < 0 else 'lifts off'}"
         if known := source(batch, origins[at]):
             return known
         labels = [f"{end}.{state}" for end in "ab" for state in states] if batch.signature.ends else states

@@ -150,10 +150,10 @@ class MapSystem(OfCycles, Algebraic):
         """Their number, at all points."""
         return self.rounds * len(self.problem.batch("map").conditions(self._free)) if type(self) is MapSystem else 0
 
-    def written(self, k: int) -> str:
+    def written(self, k: int, side: float) -> str:
         """Return what the user has written for a condition and, where there are several points, at which it is."""
         point, origin = divmod(k, self.conditions // self.rounds)
-        return super().written(origin) + (f" at point {point + 1}" if self.rounds > 1 else "")
+        return super().written(origin, side) + (f" at point {point + 1}" if self.rounds > 1 else "")
 
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers that decide at all points, and their derivatives by x."""

@@ -138,9 +138,12 @@ def _inside(before: Trial, trial: Trial) -> list[Trial]:
     return [Trial.without_tangent(trial.system, x) for x in cubic]
 
 
-def _level(slopes: Array, x: Array, part: float) -> Any:
-    """Return by how much numbers change where the unknowns change by a ``part`` of 1 + their size."""
-    return part * np.abs(slopes) @ (1 + np.abs(x)) + TINY
+def _level(slopes: Array, x: Array, part: float, least: float | None = None) -> Any:
+    """Return by how much numbers change where the unknowns change by a ``part`` of 1 + their size; or, below 1, by ``least``.
+
+    A gap in metres less a force in kilonewtons has slopes of very different sizes.
+    """
+    return np.abs(slopes) @ (part * np.abs(x) + (part if least is None else least)) + TINY
 
 
 def with_outcomes(system: Any, x: Array, forced: Mapping[int, float] = MappingProxyType({})) -> Any:
@@ -173,7 +176,7 @@ def refrozen(trial: Trial) -> Any:
 def zeros(system: Any, x: Array) -> list[int]:
     """Return the conditions whose numbers are zero at x, and change beside it."""
     values, slopes = system.numbers(x)
-    return np.flatnonzero((np.abs(values) <= _level(slopes, x, LOCATED)) & slopes.any(axis=1)).tolist()
+    return np.flatnonzero((np.abs(values) <= _level(slopes, x, LOCATED, CERTAIN * CORRECTED)) & slopes.any(axis=1)).tolist()
 
 
 def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bool]:
@@ -197,9 +200,10 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
             noise = np.maximum(noise, changes)
             tangents = _tangents(there, x)
         rates = np.array(sides)[:, None] * there.numbers(x)[1][list(zero)]
-        still = LOCATED * np.linalg.norm(rates, axis=1)
         for tangent in tangents:
-            if np.all(rates @ tangent >= -still) and not any(np.abs(tangent - way.tangent).max() < DOUBLED for way in found):
+            if np.all(rates @ tangent >= -_level(rates, tangent, LOCATED, CORRECTED)) and not any(
+                np.abs(tangent - way.tangent).max() < DOUBLED for way in found
+            ):
                 found.append(Way(there, tangent))
     bends = any(np.any(np.abs(each - slopes[0]) > CERTAIN * noise + LOCATED * np.abs(each).max()) for each in slopes[1:])
     return found, missing, bends
@@ -246,7 +250,9 @@ def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple
     kind = "several" if len(leading) > 1 else kind
     unstable = [each.unstable(x) for each in (system, *(way.system for way in leading[:1]))]
     found = Corner(kind, tuple(way.tangent for way in leading), (unstable[0], unstable[-1]))
-    name = f"{' and '.join(system.written(k) for k in zero)}: {kind}"
+    behind = leading[0].system.sides if leading else -system.sides
+    changed = [k for k in zero if behind[k] != system.sides[k]] or zero  # a contact that stays is none of it
+    name = f"{' and '.join(system.written(k, behind[k]) for k in changed)}: {kind}"
     return replace(
         point, trial=Trial(system, x, Linearization(came, point.trial.sign)), name=name, stop=None, details=found
     ), leading
@@ -254,12 +260,12 @@ def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple
 
 def _polished(system: Any, x: Array, hit: int) -> Array:
     """Return the point at which a number is zero."""
-    for _ in range(2):
+    for _ in range(3):
         values, slopes = system.numbers(x)
         with np.errstate(all="ignore"):
             residual, factors = system.linearize(x, (slopes[hit],))
             moved = x - factors.solve(np.append(residual, values[hit]))
-        if not np.abs(moved - x).max() < APART * (1 + np.abs(x).max()):
+        if not np.abs(moved - x).max() < ROUGH * (1 + np.abs(x).max()):
             return x  # beside it the equations are singular
         x = moved
     return x

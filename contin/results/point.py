@@ -130,6 +130,11 @@ class Point(Record):
         return point_to_html(self)
 
     @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts (``pushes`` of a variational problem) that hold."""
+        return tuple(self.system.problem.touching(self.system, self.x)) if hasattr(self.system.problem, "touching") else ()
+
+    @property
     def normal_form(self) -> float | None:
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
