@@ -575,6 +575,7 @@ class Collocation(Composed):
         nearest = self.mesh[np.abs(self.mesh - moving.places[:, None]).argmin(axis=1)]
         off = np.abs(nearest - moving.places) > CORRECTED * (self.mesh[-1] - self.mesh[0])
         places = np.where(off if closely else ~moving.settled, moving.places, nearest)
+        places = places[(places > self.mesh[0]) & (places < self.mesh[-1])]
         return np.unique(np.concatenate([self.breaks, places]))
 
     @property

@@ -223,6 +223,10 @@ class Continuation:
             label, name = (Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
+        if isinstance(step, SpecialPoint):
+            self.stop = step.stop
+            yield self._point(located_again(step, self.settings), self.state, accuracy=self._accuracy)
+            return
         self._accuracy = accuracy_of(step.end)
         arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
         special = within_limits(arc, special, self._limits)
@@ -294,8 +298,8 @@ class Continuation:
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _step(self, state: State) -> Step:
-        """Predict and correct, halving the step until the corrected point can be believed."""
+    def _step(self, state: State) -> Step | SpecialPoint:
+        """Predict and correct, halving the step until the corrected point can be believed; or return the end of the branch."""
         settings, (step, _, made), self._handed = self.settings, self._handed or (0.0, None, None), None
         if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
             step, made = length_of(state, settings), None
@@ -313,6 +317,9 @@ class Continuation:
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
+                home: SpecialPoint | None = state.system.home_ahead(state, step)
+                if home is not None and all(test.function(home.trial) <= 0 for test in self._limits):
+                    return home
             step, made = step / 2, None
             if step < settings.min_step:
                 raise problem

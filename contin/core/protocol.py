@@ -280,6 +280,10 @@ class Discretization(Equations, Protocol):
         """The `Batch` of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
         return None
 
+    def home_ahead(self, state: Any, step: float) -> Any:
+        """Return where the branch ends within a step that failed, if that is known."""
+        return None
+
     def home(self, arc: Any) -> Any:
         """Return the end of the branch inside a step, where solutions become those of another kind, or None."""
         return None

@@ -31,10 +31,11 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
 from contin.core.newton import correct, nearest_zero
-from contin.core.step import Reason, Stop
+from contin.core.protocol import inner
+from contin.core.step import Reason, State, Stop
 from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
-from contin.events.arc import Arc, SpecialPoint, find_zero
+from contin.events.arc import OFF, Arc, SpecialPoint, find_zero
 from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, MOST_UPDATES, ROUND_OFF, TINY
 from contin.linalg.matrices import eigenvalues
 from contin.linalg.orientation import first_least
@@ -298,8 +299,29 @@ def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None
         x, frequency, error = _hopf_point(system, arc.guess(at))
     except ConvergenceError:
         return None
-    if not arc.passes_by(x, at):
+    return _end(system, at, x, frequency, error) if arc.passes_by(x, at) else None
+
+
+def hopf_point_ahead(system: CycleCollocation, state: State, step: float) -> SpecialPoint | None:
+    """Return the Hopf point to which the tangent leads within a step, or None.
+
+    No step passes it where the parameter changes like the size of the cycles: beyond, the branch comes back.
+    """
+    size, rate = system.amplitude(state.x), system.amplitude(state.tangent)
+    at = -size / rate if rate < 0 else np.inf
+    if not 0 < at <= step:
         return None
+    guess = state.x + at * state.tangent
+    try:
+        x, frequency, error = _hopf_point(system, guess)
+    except ConvergenceError:
+        return None
+    is_near = inner(system, x - guess, x - guess) <= (OFF * at) ** 2
+    return _end(system, at, x, frequency, error) if is_near else None
+
+
+def _end(system: CycleCollocation, at: float, x: Array, frequency: float, error: Array) -> SpecialPoint:
+    """Return the end of a branch at a Hopf point."""
     stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
     sizes = dict(zip(system.free, map(float, error * system.free_scales)))

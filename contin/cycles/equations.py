@@ -17,10 +17,10 @@ from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.spectral import on_circle
-from contin.core.step import COLLAPSED, Reason, Stop
+from contin.core.step import COLLAPSED, Reason, State, Stop
 from contin.core.trial import Event, Trial
 from contin.cycles.curves import DoublingCurve, TorusCurve, events_on_folds
-from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_inside, shrunk
+from contin.cycles.ends import AMPLITUDE, explained, homoclinic, hopf_point_ahead, hopf_point_inside, shrunk
 from contin.cycles.floquet import critical_angle, doubled, doubles, doubling, has_double_one, keep_off_one, torus, unstable
 from contin.cycles.normal_forms import CycleForm
 from contin.draws import ASIDE
@@ -588,6 +588,10 @@ class CycleCollocation(PeriodicCollocation):
     def home(self, arc: Arc) -> SpecialPoint | None:
         """Return the Hopf point inside a step."""
         return hopf_point_inside(self, arc)
+
+    def home_ahead(self, state: State, step: float) -> SpecialPoint | None:
+        """Return the Hopf point to which the tangent leads within a step."""
+        return hopf_point_ahead(self, state, step)
 
     def collapsed(self, x: Array, z: Array) -> bool:
         """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""

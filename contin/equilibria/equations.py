@@ -29,9 +29,9 @@ from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
-from contin.events.normal_forms import Coefficient, DenseForm, at_special_point, fold
+from contin.events.normal_forms import NOT_SMOOTH, Coefficient, DenseForm, at_special_point, fold
 from contin.functions.batch import Batch
-from contin.levels import CERTAIN, CORRECTED, LOCATED
+from contin.levels import CERTAIN, CORRECTED, LOCATED, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import MANY, Factors
 from contin.linalg.matrices import DenseFactors, SparseFactors, eigenvalues, nearest, rightmost
 from contin.problems.angles import whole_rounds
@@ -105,6 +105,13 @@ class EquilibriumForm(DenseForm):
     def length(self, right: Numbers) -> float:
         """Return the length of v in the user's units."""
         return float(np.linalg.norm(right * self._sizes))
+
+
+#: Places on a small cycle at which a field is compared with its polynomial of third degree.
+_WAVES = 8
+#: Factor by which the difference falls on a cycle half as large, at least: 16, and 8 or 4 where terms of third or second degree
+#: are not smooth.
+_DROPS = 11.0
 
 
 class CriticalPair(NamedTuple):
@@ -511,9 +518,41 @@ class Algebraic(Spectral, Composed):
         """Return the first Lyapunov coefficient at a Hopf point; of folds, which take .3 ms, nothing."""
         if point.test is None or point.test.normal_form is fold:
             return None
-        frequency = frequency_of(point)
-        is_of_the_field = frequency is None or has_pair(self.jacobian(point.trial.x), frequency)
-        return at_special_point(self, point) if is_of_the_field else None
+        frequency, x = frequency_of(point), point.trial.x
+        if frequency is None or not point.is_simple or not has_pair(self.jacobian(x), frequency):
+            return None
+        return at_special_point(self, point) if self.is_smooth(x, frequency) else NOT_SMOOTH
+
+    def is_smooth(self, x: Array, frequency: float) -> bool:
+        """Return whether the field at a Hopf point is a polynomial of third degree but for terms of fourth, along small cycles.
+
+        It is tried on smaller and smaller ones, until what is left is round-off.
+        """
+        field, last, ratio = self.thawed.as_field(), np.nan, np.nan
+        (term,), pair = field._terms, critical_pair(self.jacobian(x), frequency)
+        vector = pair.right / self.scales.states
+        turning = np.exp(2j * np.pi * np.arange(_WAVES) / _WAVES)[:, None] * vector / np.abs(vector).max()
+        waves, along = turning.real, (1j * pair.frequency * turning).real
+        _, u, none, p = term.inputs(x)
+
+        def left_over(h: float) -> Array:
+            there = term.batch.values(np.zeros(_WAVES), u + h * waves, none, p)
+            return there - here - np.tensordot(h ** np.arange(1, 4), terms, 1)
+
+        with np.errstate(all="ignore"):
+            terms, error = field.with_derivative_error(
+                lambda: np.array([along, field.stack_along(x, [waves] * 2) / 2, field.stack_along(x, [waves] * 3) / 6])
+            )
+            if not np.isfinite(terms).all():
+                return False
+            here = term.batch.values(np.zeros(_WAVES), u.repeat(_WAVES, 0), none, p)
+            for h in ASIDE * 0.5 ** np.arange(MOST_UPDATES):
+                less, left, more = (left_over(h * (1 + part)) for part in (-ROUGH, 0, ROUGH))
+                noise = np.abs(more - 2 * left + less).max() + h * (error + pair.off) * np.abs(along).max()
+                if np.abs(left).max() <= CERTAIN * noise:
+                    break
+                ratio, last = last / np.abs(left).max(), np.abs(left).max()
+        return not ratio < _DROPS
 
 
 #: Largest part of its entries that may differ from zero.

@@ -160,7 +160,7 @@ def _interpolated(known: list[Value], otherwise: float) -> float:
 #: Part of the corrector's tolerance of a step to which a zero is located: what the corrector leaves is round-off of functions.
 _SHARE = 1e-2
 #: Points of the curve lie no further off the cubic than this part of the step; others belong to another branch.
-_OFF = 0.1
+OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
 LEAST_COSINE = 0.1
 
@@ -312,7 +312,7 @@ class Arc:
     def passes_by(self, x: Array, at: float) -> bool:
         """Return whether x lies near the cubic at a distance along the state's tangent, and not on another branch."""
         gap = x - self.guess(at)
-        return float(np.sqrt(inner(self.state.system, gap, gap))) < _OFF * self.step
+        return float(np.sqrt(inner(self.state.system, gap, gap))) < OFF * self.step
 
     def guessed(self, distance: float) -> Trial:
         """Return the cubic at a distance as a trial, with the state's tangent."""

@@ -113,6 +113,10 @@ class Coefficient:
 UNKNOWN = Coefficient(math.nan, math.nan, lambda: math.nan)
 
 
+#: That of a point where the equations are not smooth, and no normal form is known.
+NOT_SMOOTH = Coefficient(math.nan, math.nan, lambda: math.nan)
+
+
 class Direction(NamedTuple):
     """A direction at all places where the forms are evaluated, and the change of the period along it, as a part of that."""
 

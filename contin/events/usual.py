@@ -99,6 +99,8 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
     is nothing but error is left out, and its error is stated. Where ``errors`` are not wanted, and none could change the sign,
     it is not estimated.
     """
+    if found is normal_forms.NOT_SMOOTH:
+        return dataclasses.replace(point, name=f"{point.name}, not smooth")
     unknown = not errors and found.is_certain
     error = 0.0 if unknown else found.error + abs(found.value - coarse.value)
     value = {} if found.is_meaningless(error) else {"normal_form": found.value}

@@ -20,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from contin.kernels.kernel_parts import helper
+from contin.levels import TINY
 
 #: Places of operands on a tape, and recorded operands.
 Places = tuple[int, ...]
@@ -156,6 +157,20 @@ def _simple_select(tape: Recorder, places: Places) -> int | None:
 def _of_pow(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any]:
     x, y = operands
     return y * x ** (y - 1.0), tape.apply("product", result, tape.apply("log", x))
+
+
+def _are_squares(tape: Recorder, place: int) -> bool:
+    """Return whether a number is a sum of squares, by how it is computed."""
+    name, operands, _ = tape.operations[place]
+    if name in ("add", "sum"):
+        return all(_are_squares(tape, each) for each in operands)
+    half = len(operands) // 2
+    return name in ("mul", "dot") and operands[:half] == operands[half:]
+
+
+def _of_root(tape: Recorder, x: Any, r: Any) -> Any:
+    """Return the derivative of a root; that of a sum of squares is finite, and counts as 0 where it is 0."""
+    return 0.5 / (r + TINY / r if _are_squares(tape, x.place) else r)
 
 
 def _of_select(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any, Any]:
@@ -303,7 +318,7 @@ TABLE: dict[str, Primitive] = {
     "trunc": _ufunc(np.trunc, _none),
     "rint": _ufunc(np.rint, _none),
     # functions; those with a last entry are known of complex numbers too
-    "sqrt": _ufunc(np.sqrt, _one(lambda tape, x, r: 0.5 / r), pair=_root_of_pair),
+    "sqrt": _ufunc(np.sqrt, _one(_of_root), pair=_root_of_pair),
     "exp": _library(
         np.exp, "exp", lambda tape, x, r: r,
         lambda f, x, y: (f("exp", x) * f("cos", y), f("exp", x) * f("sin", y)),
@@ -352,7 +367,7 @@ TABLE: dict[str, Primitive] = {
     ),
     "pow": _ufunc(np.power, _of_pow, "pow"),
     "atan2": _ufunc(np.arctan2, lambda tape, data, xs, r: _of_angle(*xs), "atan2"),
-    "hypot": _ufunc(np.hypot, lambda tape, data, xs, r: (xs[0] / r, xs[1] / r), "hypot"),
+    "hypot": _ufunc(np.hypot, lambda tape, data, xs, r: (xs[0] / (r + TINY), xs[1] / (r + TINY)), "hypot"),
     "mod": _ufunc(np.mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "fmod"),
     # a piecewise polynomial; an unknown that is found by iteration; the first operand, as a minimum over such unknowns
     "table": Primitive(

@@ -138,6 +138,8 @@ class Point(Record):
     def normal_form(self) -> float | None:
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
+        There is none at a Hopf point whose field is not smooth, as with v |v|: its name says so.
+
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
         period doubling c and at a torus bifurcation Re d of `contin.events.normal_forms`; at a fold of cycles |b|, zero
         at a cusp. The c of period doublings of maps is positive where they are supercritical. Its estimated error is

@@ -21,6 +21,7 @@ from contin.connections.statement import ConnectionProblem
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.labels import Label
+from contin.core.newton import correct
 from contin.core.protocol import Discretization
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.step import Reason
@@ -34,7 +35,7 @@ from contin.equilibria.equations import Algebraic, CriticalPair, critical_pair
 from contin.errors import ConvergenceError, ProblemError, Within, warn
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import finding_of, frequency_of
-from contin.levels import APART, BESIDE
+from contin.levels import APART, BESIDE, ROUGH
 from contin.linalg.orientation import oriented_along
 from contin.problems.angles import winding_names, windings
 from contin.problems.statement import PERIOD, ROUNDS, TIME, forget_changed
@@ -53,20 +54,37 @@ def switches(point: Point) -> bool:
 
 
 def switched(
-    point: Point, fewest: int, free: Sequence[str] | None = None
+    point: Point, fewest: int, free: Sequence[str] | None = None, way: float = 1
 ) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
 
     Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free. The
-    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more. Raises ProblemError where none begin there;
-    ConvergenceError where the branch point of doubled orbits is not found.
+    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more. ``way`` is +1 or -1, as ``direction``. Raises
+    ProblemError where none begin there; ConvergenceError where the branch point of doubled orbits is not found.
     """
-    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point, max(fewest, _INTERVALS))
-    if free is None:
-        return cycles, x, tangent
-    found, x = cycles.with_free(checks.names("free", free), x)
-    along: Any = found.pack(cycles.states(tangent), dict.fromkeys(found.free, 0.0))
-    return found, x, along
+    if doubles(point):
+        found, x, along = doubled(point)
+    else:
+        found, x, along = from_hopf(point, max(fewest, _INTERVALS))
+    if free is not None:
+        cycles = found
+        found, x = cycles.with_free(checks.names("free", free), x)
+        along = found.pack(cycles.states(along), dict.fromkeys(found.free, 0.0))
+    system: Any = point.system
+    if doubles(point) or system.is_smooth(point.x, frequency_of(point)):
+        return found, x, way * along
+    return found, x, _one_sided(found, x, way * along)
+
+
+def _one_sided(cycles: Any, x: Array, along: Array) -> Array:
+    """Return the tangent with the rates of the free parameters by the size of a cycle, from a small cycle.
+
+    Terms like v |v| make them other than zero. Along the ellipse alone no step is believed, however short.
+    """
+    size = ROUGH / np.abs(along).max()
+    beside, row = cycles.with_reference(x + size * along), cycles.weights * along
+    rates = (correct(beside, x + size * along, row, row @ (x + size * along)).x - x) / size
+    return np.append(along[: cycles.state_size], rates[cycles.state_size :])
 
 
 def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Array]:
@@ -378,8 +396,7 @@ def _first(
             raise ProblemError("tangent: must be left out where branch or free is given")
         return system, x, way * checks.array("tangent", tangent, (system.size,)), True
     if branch == 1 and switches(start):
-        cycles, x, along = switched(start, settings.mesh.min_intervals, free)
-        return cycles, x, way * along, True
+        return *switched(start, settings.mesh.min_intervals, free, way), True
     if branch == 1 and begins_oscillations(start):
         first, along = oscillation(start)
         oscillations: Any = first.system
