@@ -71,6 +71,17 @@ def meant(name: str, known: Iterable[str]) -> str:
     return f" (did you mean {names[found[0]]!r}?)" if found else ""
 
 
+def one_of(name: object, known: Iterable[str], what: str = "") -> str:
+    """Return that a name must be one of the known ones, with the one that is most like it; ``what`` stands before them.
+
+    Examples
+    --------
+    >>> one_of("degre", ["degree", "intervals"])
+    "'degre' (did you mean 'degree'?) must be one of degree, intervals"
+    """
+    return f"{name!r}{meant(str(name), known)} must be one of {what}{', '.join(known) or 'none: there are none'}"
+
+
 #: Characters of a line: a screen has 80 to 130.
 WIDTH = 80
 #: Lines that a text has at most, and names that a message lists: a screen has 24 lines or more. The others are counted.

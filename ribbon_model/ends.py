@@ -19,7 +19,7 @@ moment or force vanishes there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from contin.lowlevel import levels, meant
@@ -219,13 +219,12 @@ def along(vector: Vector, components):
     return sum(a * x for a, x in zip(vector, components) if a != 0)
 
 
-def check_known(numbers: Mapping[str, float], known: tuple[str, ...]) -> None:
+def check_known(numbers: Iterable[str], known: Sequence[str], where: str = "numbers: ") -> None:
     """Raise ValueError for a number that nothing uses."""
     for name in numbers:
         if name not in known:
-            raise ValueError(
-                f"numbers: {name}{meant(name, known)} is used by nothing here; there are {', '.join(known) or 'none'}"
-            )
+            there = ", ".join(dict.fromkeys(known)) or "none"
+            raise ValueError(f"{where}{name}{meant(name, known)} is used by nothing here; there are {there}")
 
 
 # --- a roller: a condition under an integral, as a phase ------------------------------------------------------------------

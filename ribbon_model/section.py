@@ -20,7 +20,8 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 
-from ribbon_model.ends import ANGLES, LOOSE, PLACE, angles_of
+from contin.lowlevel import one_of
+from ribbon_model.ends import ANGLES, LOOSE, PLACE, angles_of, check_known
 from ribbon_model.equilibrium import directors, spin
 from ribbon_model.law import Law
 from ribbon_model.laws import FLAT_ROD, OPEN_LAWS
@@ -110,6 +111,8 @@ class Section:
             raise ValueError(f"along: width, thickness: are for flat strips, not for the law {name!r}")
         for datum in self.along:
             self._check_datum(datum)
+        used = {name for text in self.along.values() for name in _names(ast.parse(text, mode="eval"))}
+        check_known(numbers, (*self.law.parameters, *law.parameters, *self.natural, *softness, *used), "")
 
     def _check_datum(self, name: str) -> None:
         """Raise ValueError for an expression without a finite value along the strip, or a width or thickness that vanishes."""
@@ -242,7 +245,7 @@ class Section:
 def section_of(law: str, numbers: Mapping[str, float], along: Mapping[str, str] = MappingProxyType({})) -> Section:
     """Return the section of a law that is named, as in scenes; raises as `Section`."""
     if law not in OPEN_LAWS:
-        raise ValueError(f"law: {law!r} must be one of {', '.join(OPEN_LAWS)}")
+        raise ValueError(f"law: {one_of(law, OPEN_LAWS)}")
     return Section(OPEN_LAWS[law], numbers, along)
 
 
@@ -271,6 +274,10 @@ def compiled(text: str, names: tuple[str, ...]) -> Datum:
     scope = {"math": math}
     exec(compile(f"def datum(t, p):\n    return {ast.unparse(_Fields(names).visit(tree))}", "<along>", "exec"), scope)
     return scope["datum"]
+
+
+def _names(tree: ast.AST) -> set[str]:
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
 
 
 class _Fields(ast.NodeTransformer):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import contin
+from contin.lowlevel import one_of
 from ribbon_model import ends, loads
 from ribbon_model.ends import ANGLES, FREE, HINGED, JOINT, LOOSE, End, Roller, Support, Vector, product
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_of
@@ -58,7 +59,7 @@ class Statement:
             setattr(self, name, ends.unit(name, getattr(self, name)))
         for name in self.phases:
             if isinstance(name, str) and (name not in PHASES or len(self.members) > 1):
-                raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}, for one strip")
+                raise ValueError(f"phases: {one_of(name, PHASES)}, for one strip")
         self.phases = tuple(PHASES[one] if isinstance(one, str) else one for one in self.phases)
         self._check()
         ends.check_known(self.numbers, self.known)
@@ -588,7 +589,7 @@ def _whole(p):
 def _known(what: str, name: str, names: Mapping) -> None:
     """Raise ValueError for a name of nothing."""
     if name not in names:
-        raise ValueError(f"{what}: {name!r} must be one of {', '.join(names) or 'none: there are none'}")
+        raise ValueError(f"{what}: {one_of(name, names)}")
 
 
 def _together(kind: str, axis: Vector, first, frame) -> list:

@@ -10,7 +10,7 @@ import functools
 import keyword
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -31,11 +31,12 @@ from branches.scene.open_strip import (
     StagedScene,
     finite,
 )
+from contin.lowlevel import meant, one_of
 from ribbon_model.changed_supports import replacing
 from ribbon_model.ends import DIRECTIONS, FREE_END, LOOSE, End
 from ribbon_model.equilibrium import directors
 from ribbon_model.members import BALL, FINISH, HINGE, RIGID, START, Joint, JointEnd, Load, Member, frame_along, straight
-from ribbon_model.network import FOLLOWER, POTENTIALS, Network, column
+from ribbon_model.network import FOLLOWER, POTENTIALS, Network
 from ribbon_model.section import Section
 
 #: An end of a strip, or a place along it, in words.
@@ -109,7 +110,7 @@ class JointConfig(Strict):
         for part in ("angle", "arm"):
             for name in getattr(self, part):
                 if name not in self.strips:
-                    raise ValueError(f"{part}: {name!r} must be one of the strips of the joint: {', '.join(self.strips)}")
+                    raise ValueError(f"{part}: {one_of(name, self.strips, 'the strips of the joint: ')}")
         return self
 
 
@@ -206,7 +207,7 @@ class NetworkScene(StagedScene):
             raise ValueError("material, sections: give one of them")
         if self.stages[0].held or self.stages[0].numbers:
             raise ValueError("stage 1: held, numbers: those of the scene are the first stage's")
-        self.check_stages([f"{column(name)}_{axis}" for name in self.strip().joints for axis in "xyz"])
+        self.check_stages()
         networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
         names = [*({name for network in networks for name in network.parameters}), *self.found_names, *OWN]
         for name, times in Counter([*names, *(f"error_{name}" for name in names)]).items():
@@ -288,8 +289,8 @@ class NetworkScene(StagedScene):
         sections = self._sections()
         members, joints = dict(self._drawn), {}
         cuts: dict[str, list[float]] = {}
-        for where, place in self._places():
-            name, end, part = _parsed(where, place, members)
+        for where, place, joined in self._places():
+            name, end, part = _parsed(where, place, members, joined)
             if end is None and part not in cuts.setdefault(name, []):
                 cuts[name].append(part)
         pieces: dict[str, list[str]] = {}
@@ -311,7 +312,7 @@ class NetworkScene(StagedScene):
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
         for name in changed:
             if name not in joints:
-                raise ValueError(f"held: {name!r} must be one of {', '.join(joints)}")
+                raise ValueError(f"held: {one_of(name, joints)}")
         for name in changed:
             for number, load in replacing(name, held.get(name)).items():
                 if number in loads:
@@ -352,11 +353,9 @@ class NetworkScene(StagedScene):
         for name, strip in self.strips.items():
             section = strip.section or (next(iter(sections)) if len(sections) == 1 else None)
             if section not in sections:
-                raise ValueError(f"strips: {name}: section: {strip.section!r} must be one of {', '.join(sections)}")
+                raise ValueError(f"strips: {name}: section: {one_of(strip.section, sections)}")
             if strip.after is not None and strip.after not in found:
-                raise ValueError(
-                    f"strips: {name}: after: {strip.after!r} must be a strip before it: {', '.join(found) or 'none'}"
-                )
+                raise ValueError(f"strips: {name}: after: {one_of(strip.after, found, 'the strips before it: ')}")
             try:
                 found[name] = _member(section, strip, found)
             except ValueError as error:
@@ -366,12 +365,12 @@ class NetworkScene(StagedScene):
             for L in [self.size("length")] for name, one in found.items()
         }  # fmt: skip
 
-    def _places(self) -> Iterator[tuple[str, str]]:
-        """Yield all places along strips that are named, and where."""
+    def _places(self) -> Iterator[tuple[str, str, Iterable[str]]]:
+        """Yield where places along strips are named, the places, and the joints that may stand there."""
         for name, joint in self.joints.items():
-            yield from ((f"joints: {name}", place) for place in joint.strips)
+            yield from ((f"joints: {name}", place, ()) for place in joint.strips)
         for number, actions in self.loads.items():
-            yield from ((f"loads: {number}", place) for place in actions if place not in self.joints)
+            yield from ((f"loads: {number}", place, self.joints) for place in actions if place not in self.joints)
 
     def _load(self, number: str, actions: dict[str, ForceConfig], joints: dict[str, Joint], cuts, pieces) -> Load:
         """Return a load; a place along a strip that is no joint becomes one."""
@@ -410,11 +409,14 @@ class NetworkScene(StagedScene):
         return f"{count} strip{'s' * (count != 1)} ({self.law_name}), {joints} joint{'s' * (joints != 1)}"
 
 
-def _parsed(where: str, place: str, names) -> tuple[str, str | None, float | None]:
-    """Return strip, end and part of the length that words name."""
+def _parsed(where: str, place: str, names, joints: Iterable[str] = ()) -> tuple[str, str | None, float | None]:
+    """Return strip, end and part of the length that words name; a message names the ``joints`` that may stand there, too."""
     found = _PLACE.fullmatch(place)
     if not found or found[1] not in names or (found[3] is not None and not 0 < float(found[3]) < 1):
-        raise ValueError(f"{where}: {place!r} must be {_PLACES}; strips are {', '.join(names)}")
+        near = meant(place, [*(f"{name} {end}" for name in names for end in (START, FINISH)), *joints])
+        others = f"; joints are {', '.join(joints)}" if joints else ""
+        must = f"{'a joint, or ' if joints else ''}{_PLACES}"
+        raise ValueError(f"{where}: {place!r}{near} must be {must}; strips are {', '.join(names)}{others}")
     return found[1], found[2], None if found[3] is None else float(found[3])
 
 

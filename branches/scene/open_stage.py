@@ -16,7 +16,7 @@ from branches.scene.labels import START, begins, label_of, without_round_off
 from branches.scene.open_strip import StagedScene
 from branches.scene.stage import Stage, Watch, errors_of, no_state, reached
 from branches.scene.words import words_of
-from contin import ContinError, ConvergenceError, MeshControl, Newton, Point, ProblemError, Reason, Settings
+from contin import ContinError, ConvergenceError, Event, MeshControl, Newton, Point, ProblemError, Reason, Settings
 from contin.lowlevel import Collocation, Continuation, Label, State, Stop, exact_text, levels, point_of
 from ribbon_model.changed_supports import held_at, with_supports
 
@@ -58,6 +58,7 @@ class OpenStage(Stage):
         self.head = f"{self.follow:>14s}{''.join(f'  {name:>12s}' for name in self._shown_in_rows)}  index   N  it"
         self._how = ""
         self._largest = abs(self.stage.to)
+        self._stiffness = min(section.stiffness for section in self.strip.sections.values())  # what round-off is compared with
         self._missed: list[str] = []
 
     # --- the run --------------------------------------------------------------------------------------------------------
@@ -159,10 +160,11 @@ class OpenStage(Stage):
         except ProblemError as error:
             raise ConfigError(str(error)) from error
         start = point_of(run.state.system, run.state.x)
-        for name, (low, high) in run.settings.limits.items():
+        values = {**start.parameters, **start.functionals, **self.found(start)}
+        for name, (low, high) in {**run.settings.limits, **self._limits}.items():
             slack = levels.LOCATED * max(abs(low), abs(high), high - low)
-            if not low - slack <= start[name] <= high + slack:
-                here, *ends = (f"{self.scene.factor(name) * value:.10g}" for value in (start[name], low, high))
+            if not low - slack <= values[name] <= high + slack:
+                here, *ends = (f"{self.scene.factor(name) * value:.10g}" for value in (values[name], low, high))
                 words, unit = " to ".join(ends), f" {self.scene.unit(name)}".rstrip()
                 first = "stage 1: " if self.number == 1 else ""  # later ones are named by the caller
                 where = f"limits: {name} = {here}{unit} at the start of the stage is outside its limits, {words}{unit}"
@@ -221,6 +223,10 @@ class OpenStage(Stage):
         settings = dataclasses.replace(self._settings(origin.system, origin.x), direction=way)
         return settings, way * origin.details.tangents[1]
 
+    @property
+    def _limits(self) -> dict[str, tuple[float, ...]]:
+        return {name: tuple(end / self.scene.factor(name) for end in ends) for name, ends in self.stage.limits.items()}
+
     def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
         """Return the settings of a stage that starts at a state."""
         stage, steps = self.stage, self.scene.steps
@@ -228,14 +234,27 @@ class OpenStage(Stage):
         to = stage.to / self.scene.factor(stage.follow)
         reach = abs(to - here) or 1.0
         limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
-        limits |= {name: tuple(end / self.scene.factor(name) for end in ends) for name, ends in stage.limits.items()}
+        limits |= self._limits
         zeros = {name: [value / self.scene.factor(name) for value in values] for name, values in stage.label.items()}
+        events = self.strip.domain_tests()
+        for name in [name for name in zeros if name in self.scene.found_names]:
+            events += [self._test(Label.USER_ZERO, name, value) for value in zeros.pop(name)]
+        for name in [name for name in limits if name in self.scene.found_names]:
+            events += [self._test(Label.END, name, end, side, True) for side, end in zip((-1, 1), limits.pop(name))]
         return Settings(
             primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
             max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
-            zeros=zeros, mesh=self.mesh_control(), newton=newton_of(self.scene), events=self.strip.domain_tests(),
+            zeros=zeros, mesh=self.mesh_control(), newton=newton_of(self.scene), events=events,
             scales=self.strip.sizes(system, x),
         )  # fmt: skip
+
+    def _test(self, label: Label, name: str, value: float, side: int = 1, ends: bool = False) -> Event:
+        """Return the test function of a value of what is found in states; one that ``ends`` the run is positive outside."""
+
+        def beyond(trial) -> float:
+            return side * without_round_off(self.found(point_of(trial.system, trial.x))[name] - value, self._stiffness)
+
+        return Event(label, self._shown(name, value), beyond, terminal=ends, limit=ends)
 
     # --- columns --------------------------------------------------------------------------------------------------------
 
@@ -276,9 +295,8 @@ class OpenStage(Stage):
 
     def row(self, point: Point, step: float) -> str:
         factor, told = self.scene.factor, {"energy": point["energy"], **point.functionals, **self.found(point)}
-        stiffness = min(section.stiffness for section in self.strip.sections.values())  # what round-off is compared with
         self._largest = max(self._largest, abs(point[self.follow] * factor(self.follow)))
-        others = (without_round_off(told[name], stiffness) * factor(name) for name in self._shown_in_rows)
+        others = (without_round_off(told[name], self._stiffness) * factor(name) for name in self._shown_in_rows)
         value = without_round_off(point[self.follow] * factor(self.follow), self._largest)
         return (
             f"{value:14.8g}{''.join(f'  {other:12.6g}' for other in others)}"

@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.scene.fields import ConfigError, Interval, MeshConfig, Scene, StepConfig, Strict, show
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
-from contin.lowlevel import exact_text, meant
+from contin.lowlevel import exact_text, meant, one_of
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, Vector, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.plate import RIGIDITIES
@@ -56,7 +56,7 @@ def _direction(value: object, words: Mapping[str, Any]) -> Any:
     if isinstance(value, str) and value in words:
         return words[value]
     if not isinstance(value, (list, tuple)) or len(value) != 3 or any(type(part) not in (int, float) for part in value):
-        raise ValueError(f"must be {', '.join(words)} or three numbers, not {value!r}")
+        raise ValueError(f"must be {', '.join(words)} or three numbers, not {value!r}{meant(str(value), words)}")
     return unit("direction", value)
 
 
@@ -107,7 +107,9 @@ def _belongs(field: str, rotations: str, value: object, rotation: str) -> str:
 
 def _end(value: object) -> Any:
     if isinstance(value, str) and value not in _WORDS:
-        raise ValueError(f"{value!r} must be {', '.join(_WORDS)}, or fields such as rotation and slides_along")
+        raise ValueError(
+            f"{value!r}{meant(value, _WORDS)} must be {', '.join(_WORDS)}, or fields such as rotation and slides_along"
+        )
     return _WORDS[value] if isinstance(value, str) else value
 
 
@@ -329,7 +331,7 @@ class StagedScene(Scene):
             if given:
                 raise ValueError(f"{where}: {given[0]} must not be given together with dimensions")
             if law not in _OF_DIMENSIONS:
-                raise ValueError(f"{where}: law: {law!r} must be one of {', '.join(_OF_DIMENSIONS)} together with dimensions")
+                raise ValueError(f"{where}: law: {one_of(law, _OF_DIMENSIONS)} together with dimensions")
             if law != self._law:
                 raise ValueError(f"{where}: law: {law!r} must be that of the first section, {self._law!r}, with dimensions")
             values["nu"] = d.poisson_ratio
@@ -340,28 +342,23 @@ class StagedScene(Scene):
         numbers = numbers_of(where, values)
         return section_of(str(law), {name: x / self.size(KINDS.get(name, "")) for name, x in numbers.items()}, along)
 
-    def check_stages(self, columns: Sequence[str]) -> None:
-        """Raise ValueError for a stage that names what is not there; ``columns`` are others than the numbers."""
+    def check_stages(self, columns: Sequence[str] = ()) -> None:
+        """Raise ValueError for a stage that names what is not there; ``columns`` are others than numbers and what is found."""
         for number, stage in enumerate(self.stages, 1):
             if stage.stage is not None and stage.stage >= number:
                 raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
             parameters = self.strip(number).parameters
             if stage.follow not in parameters:
-                followed = ", ".join(parameters)
-                near = meant(stage.follow, parameters)
-                raise ValueError(f"stage {number}: follow: {stage.follow!r}{near} must be one of the numbers here: {followed}")
+                raise ValueError(f"stage {number}: follow: {one_of(stage.follow, parameters, 'the numbers here: ')}")
             if number == 1 and (stage.start_at or stage.stage):
                 raise ValueError("stage 1: start_at: the first stage starts from the first state")
             for name in stage.numbers:
                 if name not in parameters:
-                    near = meant(name, parameters)
-                    raise ValueError(f"stage {number}: numbers: {name!r}{near} must be one of {', '.join(parameters)}")
+                    raise ValueError(f"stage {number}: numbers: {one_of(name, parameters)}")
             for name in (*stage.limits, *stage.label):
-                known = dict.fromkeys((*parameters, *columns, "energy"))
+                known = dict.fromkeys((*parameters, *columns, "energy", *self.found_names))
                 if name not in known:
-                    raise ValueError(
-                        f"stage {number}: {name!r}{meant(name, known)} must be one of the columns {', '.join(known)}"
-                    )
+                    raise ValueError(f"stage {number}: {one_of(name, known, 'the columns ')}")
 
     #: A column that the table of a run shows beside the followed number and the energy; '' for what is conjugate to the number.
     BESIDE: ClassVar[str] = ""

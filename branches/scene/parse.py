@@ -231,13 +231,16 @@ def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
 def _fields(location, model: type[BaseModel]) -> list[str]:
     for part in location[:-1]:
         field = model.model_fields.get(part)
-        inner = [kind for kind in (field.annotation, *get_args(field.annotation)) if _is_model(kind)] if field else []
-        model = inner[0] if inner else model
+        model = next(_models(field.annotation), model) if field else model
     return list(model.model_fields)
 
 
-def _is_model(kind: object) -> bool:
-    return isinstance(kind, type) and issubclass(kind, BaseModel)
+def _models(kind: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models in the type of a field, as in a dict of lists of them."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield kind
+    for inner in get_args(kind):
+        yield from _models(inner)
 
 
 # --- the scenes of the package ----------------------------------------------------------------------------------------

@@ -19,12 +19,11 @@ from branches.run.barriers import falls, places, report, told
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
-from branches.scene.network import column
 from branches.scene.open_stage import OpenStage
 from branches.scene.parse import dump, load, parse
 from contin import ContinError, trace
 from ribbon_model.descent import past
-from ribbon_model.network import START
+from ribbon_model.network import START, column
 from ribbon_model.network_first import first_state
 from tests.ribbon_model.test_network_independent import Shooting
 
@@ -366,14 +365,17 @@ MISTAKES = {
     "strips: {a: {begin: [0, 0, 0], length: 1.0}}": "strips.a: along: is missing; a strip that begins at a place needs it",
     "strips: {a: {begin: [0, 0, 0], end: [0, 0, 0], normal: [0, 1, 0]}}": "strips: a: a member from [0.0, 0.0, 0.0] to",
     "strips: {a: {begin: [0, 0], end: [0, 0, 1], normal: [0, 1, 0]}}": "strips.a.begin: must be three numbers, not [0, 0]",
-    "strips: {a: {after: b, length: 1.0}}": "strips: a: after: 'b' must be a strip before it: none",
+    "strips: {a: {after: b, length: 1.0}}": "strips: a: after: 'b' must be one of the strips before it: none",
     "joints: {A: [a middle]}": "joints: A: 'a middle' must be a strip and start, finish or a part of its length",
-    "joints: {A: [c start]}": "joints: A: 'c start' must be a strip and",
+    "joints: {A: [c start]}": "joints: A: 'c start' (did you mean 'b start'?) must be a strip and",
     "joints: {A: {strips: [a start], ball: true, hinge: [1, 0, 0]}}": "joints.A: hinge, ball: give one of them",
     "held: {Z: clamped}": "held: 'Z' must be one of A, cut, tip",
     "strips: {a: {begin: [0, 0, 0], along: tangent, normal: [0, 1, 0], length: 1.0}}": "a.along: must be x, y, z or",
     "directions: {weight: normal}": "directions.weight: must be x, y, z or three numbers, not 'normal'",
     "held: {A: {slides_along: x}}": "held.A.slides_along: must be width, normal, tangent or three numbers, not 'x'",
+    "held: {AA: clamped}": "held: 'AA' (did you mean 'A'?) must be one of A, cut, tip",
+    "held: {A: {rotaton: clamped}}": "unknown field 'held.A.rotaton' (did you mean 'rotation'?); the fields are rotation,",
+    "loads: {P: {tipp: [0, 0, 1]}}": "loads: P: 'tipp' (did you mean 'tip'?) must be a joint, or a strip",
     "held: {A: welded}": "held.A: 'welded' must be clamped, hinged, ball joint, free",
     "loads: {P: {tip: {moment: 1.0}}}": "loads: P: moments: tip must be held by a hinge",
     "loads: {P: {tip: {force: [0, 0, 1], moment: 1.0}}}": "loads.P.tip: force, moment: give one of them",
@@ -408,6 +410,16 @@ def test_a_mistake_is_one_sentence(change):
         parse(text, "scene.yaml")
     assert MISTAKES[change] in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_places_and_reactions_are_labelled_and_limited(run):
+    """The support of a column carries its load: F_A_z = P; a reaction that is zero throughout is labelled nowhere."""
+    stage = "follow: P, to: 3.0, label: {F_A_z: [1.5], F_A_x: [0]}, limits: {F_A_z: [0, 2]}"
+    branch = run(CANTILEVER.replace("follow: P, to: 3.0", stage))
+    found = [(event["label"].decode(), event["P"]) for event in branch.events]
+    assert [label for label, _ in found] == ["EP", "UZ", "EP"] and np.allclose([P for _, P in found], [0, 1.5, 2], atol=1e-9)
+    with pytest.raises(ConfigError, match="limits: F_A_z = 0 at the start of the stage is outside its limits, 1 to 2"):
+        run(CANTILEVER.replace("to: 3.0", "to: 3.0, limits: {F_A_z: [1, 2]}"))
 
 
 # --- supports that change -----------------------------------------------------------------------------------------------

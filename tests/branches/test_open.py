@@ -35,10 +35,10 @@ SIZES = (
 #: Scenes with one mistake, and a part of the sentence.
 MISTAKES = {
     "stages: []": "the field 'material' is missing",
-    TIP.replace("flat rod", "flat"): "law: 'flat' must be one of",
+    TIP.replace("flat rod", "flat"): "law: 'flat' (did you mean 'flat rod'?) must be one of",
     TIP.replace("nu: 0.3", "nu: 0.3, mu: 1, Gamma: 2"): "Gamma: is not a number of the law 'flat rod'",
     TIP.replace("nu: 0.3", "nu: x"): "material: nu: must be a number, not 'x'",
-    TIP.replace("free", "fre"): "finish: 'fre' must be clamped, hinged, ball joint, free",
+    TIP.replace("free", "fre"): "finish: 'fre' (did you mean 'free'?) must be clamped, hinged, ball joint, free",
     TIP.replace("free", "{rotation: hinged}"): "finish: about: is missing; the rotation 'hinged' needs it",
     TIP.replace("free", "{about: width}"): "finish: about: belongs to the rotation hinged or joint",
     TIP.replace("free", "{slides: width}"): "unknown field 'finish.slides' (did you mean 'slides_along'?); the fields are",

@@ -120,7 +120,8 @@ def test_what_nothing_determines_is_rejected(what, request):
 @pytest.mark.parametrize(
     "make, sentence",
     [
-        (lambda: section_of("ribon", {}), "law: 'ribon' must be one of"),
+        (lambda: section_of("ribon", {}), "law: 'ribon' (did you mean 'ribbon'?) must be one of"),
+        (lambda: section_of("ribbon", {"nu": 0.3, "kapa_n": 1.0}), "kapa_n (did you mean 'kappa_n'?) is used by nothing"),
         (lambda: section_of("ribbon", {}), "nu: is missing"),
         (lambda: section_of("ribbon", {"nu": 0.3, "tau_n": 1.0}), "tau_n: is not a number of the law 'ribbon'"),
         (lambda: section_of("flat rod", {"nu": 2.0}), "nu: 2 must be"),
