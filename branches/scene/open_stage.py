@@ -319,23 +319,26 @@ class OpenStage(Stage):
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
 
     def described(self, events: np.ndarray) -> list[str]:
-        """Return all labelled points in words, up to where nothing moves, and the branch point beyond which it is unstable."""
+        """Return all labelled points in words, up to where nothing moves, and where stability ended last."""
         lines, own = super().described(events), [event for event in events if event["stage"] == self.number]
         lines += self._at_rest(own)
         names = [(event["label"].decode(), event["name"].decode()) for event in own]
         later = [stage for number, stage in enumerate(self.scene.stages) if (stage.stage or number) == self.number]
-        changes = [at for at, event in enumerate(own) if 0 in (event["index_before"], event["index_after"])]
-        if not changes or own[at := changes[-1]]["index_after"] <= 0 or names[at][0] != Label.BRANCH_POINT:
-            return lines
-        if at in [stage.place_among(names) for stage in later]:
+        ends = [at for at, event in enumerate(own) if event["index_before"] == 0 < event["index_after"]]
+        if not ends or (at := ends[-1]) in [stage.place_among(names) for stage in later]:
             return lines
         tag = f"{names[at][0]} {sum(label == names[at][0] for label, name in names[: at + 1] if name != START)}"
         before = f"stage: {self.number} and " if self.number < len(self.scene.stages) else ""
         way = f"a stage with {before}start_at: {tag} follows the branch that leaves there"
         if own[at]["kernel"] != 1:
             way = "several modes are neutral there; a phase or an imperfection tells them apart"
-        here = self._shown(self.follow, own[at][self.follow])
-        return [*lines, f"stage {self.number}: unstable beyond {here} ({tag}): {way}"]
+        if names[at][0] == Label.FOLD:
+            way = "the branch turns back there, and what is pushed further snaps"
+        here, *again = (
+            self._shown(self.follow, event[self.follow]) for event in own[at:] if event is own[at] or event["index_after"] == 0
+        )
+        until = f", stable again from {again[0]} on" if again else ""
+        return [*lines, f"stage {self.number}: unstable beyond {here} ({tag}){until}: {way}"]
 
     def _at_rest(self, own: Sequence[np.void]) -> list[str]:
         """Return up to where nothing moves, as straight strips: there energy and conjugate differ by their errors only."""

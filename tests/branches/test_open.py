@@ -102,6 +102,18 @@ def test_a_run_says_where_stability_ended_and_how_to_go_on(tmp_path, capsys):
     assert float(found[1]) == pytest.approx(-4.0126 * math.sqrt(2 / 1.3), rel=2e-5)
 
 
+def test_a_run_says_that_stability_ended_at_a_fold(tip):
+    """The events of a run of another kind: with a fold in place of its branch point, and one that is stable again."""
+    branch = read_branch(tip)
+    events = branch.events[branch.events["stage"] == 1]
+    events["label"][1], events["force_width"][1] = b"LP", -5.0
+    fold = "stage 1: unstable beyond force_width = -5 (LP 1)"
+    snaps = "the branch turns back there, and what is pushed further snaps"
+    assert branch.stages[0].described(events)[-1] == f"{fold}: {snaps}"
+    (events["index_before"][-1], events["index_after"][-1]), events["force_width"][-1] = (1, 0), -4.0
+    assert branch.stages[0].described(events)[-1] == f"{fold}, stable again from force_width = -4 on: {snaps}"
+
+
 def test_the_file(tip):
     branch = read_branch(tip)
     assert isinstance(branch, OpenBranch) and branch.status == "complete"
