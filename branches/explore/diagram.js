@@ -2,7 +2,7 @@
 // The map, one column of the branches against another, drawn by plotly; a marker above it says where we are.
 
 const NARROW = 500; // pixels of a map in which names are short
-const MARGIN = { l: 62, r: 12, t: 8, b: 54 };
+const MARGIN = { l: 70, r: 12, t: 8, b: 54 };
 let range = { x: [0, 1], y: [0, 1] }; // of the axes when the page, or another material, was opened
 
 const shownRange = (axis) => ($("diagram").layout ? $("diagram").layout[`${axis}axis`].range : range[axis]);
@@ -95,7 +95,10 @@ function diagramTraces() {
   return [halo, ...branchTraces(lines()), points(), indexTexts(), specialPoints()];
 }
 
-function diagramLayout() {
+const LETTER = 8.5; // width of a letter of the title of an axis, in pixels
+
+function diagramLayout(height = $("diagram").clientHeight) {
+  const { title, brief } = AXES.get(now.y);
   const axis = {
     gridcolor: colour("grid"),
     zeroline: false,
@@ -109,7 +112,7 @@ function diagramLayout() {
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
     xaxis: { ...axis, title: { text: AXES.get(now.x).title, standoff: 8 }, range: range.x },
-    yaxis: { ...axis, title: { text: AXES.get(now.y).title, standoff: 10 }, range: range.y },
+    yaxis: { ...axis, title: { text: title.length * LETTER < height - MARGIN.b ? title : brief, standoff: 6 }, range: range.y },
     annotations: ringNames(),
     hovermode: "closest",
     hoverdistance: 30,

@@ -170,6 +170,7 @@ function connect() {
   $("snap").onclick = snap;
   $("copy").onclick = copyLink;
   $("save").onclick = (event) => event.target.dataset.save && save(event.target.dataset.save);
+  addEventListener("pointerup", ({ target }) => target.type === "range" && target.blur()); // arrow keys move along the branch again
   $("told").onclick = () => tell("");
   document.addEventListener("keydown", keyPressed);
   window.addEventListener("beforeprint", toPaper);
@@ -222,7 +223,7 @@ const PAPER = { width: 640, height: 280 }; // pixels of a picture on a page
 function toPaper() {
   document.documentElement.dataset.theme = "light";
   now.zoomed = { x: [...shownRange("x")], y: [...shownRange("y")] };
-  const layout = { ...diagramLayout(), ...PAPER };
+  const layout = { ...diagramLayout(PAPER.height), ...PAPER };
   layout.xaxis.range = now.zoomed.x;
   layout.yaxis.range = now.zoomed.y;
   Plotly.react("diagram", diagramTraces(), layout);

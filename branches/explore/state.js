@@ -39,7 +39,7 @@ const short = (value) =>
       .replace(/(\.\d*?)0+$/, "$1")
       .replace(/\.$/, ""),
   );
-const digits = (value, decimals = 8) => minus(Math.abs(value) < 1e6 ? value.toFixed(decimals) : value.toPrecision(9));
+const digits = (value, decimals = 8) => minus(Math.abs(value) < 1e6 ? value.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1") : value.toPrecision(9));
 /** A value at a place of a branch: between computed points those digits that hold, after a sign that it is interpolated. */
 function digitsAt(branch, name, s, most = AXES.get(name).decimals) {
   const value = branch.value(name, s),

@@ -839,6 +839,18 @@ def test_keyboard_touch_and_names(pages, browser):
     assert browser.js("explore.now.s") == 4
 
 
+def test_the_player_covers_nothing_and_arrow_keys_move_after_a_slider_was_dragged(pages, browser):
+    browser.open(pages / "m1_n2.html", width=1440, height=780)  # a window of 1440 x 900, less the bars of the browser
+    assert browser.js("getComputedStyle(document.getElementById('control')).position") == "static"
+    browser.js("explore.go(explore.now.branch, 3)")
+    x, y = browser.js("(({x, y, width, height}) => [x + 0.8 * width, y + height / 2])("
+                      "document.getElementById('width').getBoundingClientRect())")  # fmt: skip
+    browser.click(x, y)
+    width = browser.js("document.getElementById('width').value")
+    browser.key("ArrowRight")
+    assert float(width) > 8 and browser.js("document.getElementById('width').value") == width and browser.js("explore.now.s") == 4
+
+
 # --- branches of other problems -----------------------------------------------------------------------------------
 
 
