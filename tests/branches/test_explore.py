@@ -848,7 +848,9 @@ def test_the_player_covers_nothing_and_arrow_keys_move_after_a_slider_was_dragge
     browser.click(x, y)
     width = browser.js("document.getElementById('width').value")
     browser.key("ArrowRight")
-    assert float(width) > 8 and browser.js("document.getElementById('width').value") == width and browser.js("explore.now.s") == 4
+    assert (
+        float(width) > 8 and browser.js("document.getElementById('width').value") == width and browser.js("explore.now.s") == 4
+    )
 
 
 # --- branches of other problems -----------------------------------------------------------------------------------
