@@ -153,11 +153,11 @@ class _FirstPoint:
             change = self._kept(np.ones_like(self.x), sizes * moved)
             try:
                 values = self.system.residual(self.x + change) - at_rest
-            except ConvergenceError:  # outside of the domain of a connection
-                return False
-            missed.append(self._factors.solve(np.append(values, self.row @ change)) - change)
+                missed.append(self._factors.solve(np.append(values, self.row @ change)) - change)
+            except ConvergenceError:  # outside of the domain of a connection: that is not linear
+                missed.append(np.full_like(self.x, np.inf))
         near, here, far = missed
-        bent = largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)
+        bent = (largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)) & (largest(far) < np.inf)
         follows = largest(here) >= USUAL[0]
         return bool(follows.any() and np.all(largest(near) <= USUAL[0]) and np.all(follows & bent | ~still))
 

@@ -52,7 +52,7 @@ _SETTLES = 1e-6
 #: Distance from its start, as a part of the size of the motion, within which it has come back: Newton's method finds the cycle.
 _CLOSED = 1e-2
 #: Parts of the time in which it settles, in which it must come back: the first ones are enough for most.
-_PARTS = (1 / 16, 1 / 4, 1)
+_PARTS = (1 / 64, 1 / 16, 1 / 4, 1)
 #: Looks at a motion in each round of an angle: at three or less, a whole round could look like none.
 _PER_ROUND = 8
 #: Places of the round that is the guess.
