@@ -26,6 +26,9 @@ def parser() -> Parser:
     parser.add_argument("-o", "--out", help="picture to write, .pdf, .svg or .png (default: beside the result, .pdf)")
     parser.add_argument("--size", metavar="WIDTH", help="width of the picture, as in 90mm, 18cm or 7in; texts fit a narrow one")
     parser.add_argument("--style", metavar="NAME", help="style of matplotlib: its name, or a file (.mplstyle)")
+    parser.add_argument(
+        "--points", metavar="CSV", help="measured points to draw too: columns with the names of those drawn in the first line"
+    )
     of_branch = parser.add_argument_group("a branch")
     of_branch.add_argument("--x", metavar="COLUMN", help="column across (default: the number that is followed)")
     of_branch.add_argument("--y", metavar="COLUMN", help="column upwards (default: what is conjugate to it)")
@@ -118,7 +121,7 @@ def _branch(options, path: Path):
     out, size = Path(options.out) if options.out else path.with_suffix(".pdf"), _inches(options.size)
 
     def figure():
-        given = {name: getattr(options, name) for name in _OF_BRANCH} | {"size": size}
+        given = {name: getattr(options, name) for name in _OF_BRANCH} | {"size": size, "points": options.points}
         return read_branch(path).plot(**{name: value for name, value in given.items() if value is not None})
 
     return figure, out, ""
@@ -128,12 +131,14 @@ def _diagram(options, path: Path):
     from branches.graph import read
     from branches.graph.picture import figure
     from branches.graph.stored import read as read_closed
+    from branches.store.measured import read_points
 
     out = Path(options.out) if options.out else path / "diagram.pdf" if path.is_dir() else Path(f"{path.stem}.pdf")
     graph = read_closed(path) if path.is_dir() else read(path)
     law, nu, more = choose(graph, options.law, options.nu)
     size = _inches(options.size)
-    return (lambda: figure(graph, law, nu, options.window, not options.plain, size)), out, more
+    measured = options.points and read_points(options.points, {"kappa_n": "", "kappa_star": ""})
+    return (lambda: figure(graph, law, nu, options.window, not options.plain, size, measured)), out, more
 
 
 def choose(graph, law, nu):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,7 +28,7 @@ _BLACK = "#000000"
 
 def figure(
     branch, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
-    view: tuple[float, float] | None = None, size: float | None = None,
+    view: tuple[float, float] | None = None, size: float | None = None, measured: Mapping[str, np.ndarray] | None = None,
 ):  # fmt: skip
     """Return the picture of a result as a matplotlib figure.
 
@@ -43,15 +45,23 @@ def figure(
         The side from which strips are seen, azimuth and elevation in degrees; see `branches.draw.strip.View`.
     size : float, optional
         Width in inches; by default 9, or more for several diagrams.
+    measured : mapping of str to ndarray, optional
+        Measured points, by columns, which are drawn in the diagrams of two of them; see `measured_points`.
+
+    Raises
+    ------
+    ValueError
+        Measured points of other columns.
     """
     panels = [(x or branch.panels[0][0], y or branch.panels[0][1])] if x or y else branch.panels[:_PANELS]
     chosen = choose(branch, shapes, {stage for columns in panels for stage in _stages(branch, columns[0])})
     usual = max(9, 3.6 * len(panels))
     with narrowed((size or usual) / usual):
-        return _figure(branch, panels, chosen, width, branch.view if view is None else View(*view), size or usual)
+        view = branch.view if view is None else View(*view)
+        return _figure(branch, panels, chosen, width, view, size or usual, check_measured(measured or {}, panels))
 
 
-def _figure(branch, panels, chosen: list[int], width: float | None, view: View, wide: float):
+def _figure(branch, panels, chosen: list[int], width: float | None, view: View, wide: float, measured):
     from matplotlib.figure import Figure
 
     result = Figure(figsize=(wide, points(6.2 if chosen else 4.5)), layout="constrained")
@@ -61,7 +71,7 @@ def _figure(branch, panels, chosen: list[int], width: float | None, view: View, 
     handles: dict[str, Any] = {}
     for number, columns in enumerate(panels):
         axes = rows[-1].add_subplot(1, len(panels), number + 1)
-        panel(axes, branch, columns, chosen)
+        panel(axes, branch, columns, chosen, measured=measured)
         for handle, word in zip(*axes.get_legend_handles_labels()):
             handles.setdefault(word, handle)
         axes.get_legend().remove()
@@ -131,7 +141,7 @@ def choose(branch, count: int, stages: set[int]) -> list[int]:
     return sorted(set(chosen) - again)
 
 
-def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> None:
+def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True, measured=MappingProxyType({})) -> None:
     """Draw a column against another: solid where stable, with marks at labelled points and letters at the strips drawn.
 
     ``dots`` are drawn at all computed points.
@@ -177,6 +187,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
     axes.grid(alpha=0.25)
     axes.margins(0.16, 0.12)
     here = [point for point in chosen if branch.stage_of[point] in stages]
+    with_points = draw_measured(axes, measured, *columns)
     plain = [point for point in here if branch.points["label"][point] == b""]
     axes.scatter(across[plain], up[plain], s=area(18), color=_BLACK, zorder=2)
     texts += [((across[point], up[point]), chr(ord("a") + chosen.index(point)), _BLACK) for point in here]
@@ -185,11 +196,30 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True) -> 
         points_of = branch.points[rows]
         size, error = np.abs(values[rows]).max(), (points_of["newton_error"] + points_of["discretization_error"]).max()
         error *= size + branch.scene.factor(column)
-        if np.ptp(values[rows]) <= 10 * error:  # what differs by its error only is a straight line
+        if np.ptp(values[rows]) <= 10 * error and not with_points:  # what differs by its error only is a straight line
             half = (size if size > 10 * error else branch.scene.factor(column)) / 2
             limit(values[rows].mean() - half, values[rows].mean() + half)
     put(axes, texts, np.concatenate([*(curve.T for _, curve in drawn), np.column_stack([across, up])[rows]]))
     axes.legend(frameon=False, fontsize=points(11))
+
+
+def check_measured(measured: Mapping[str, np.ndarray], panels) -> Mapping[str, np.ndarray]:
+    """Return measured points; raise ValueError if they fit none of the panels, which are of two columns each."""
+    if measured and not any(x in measured and y in measured for x, y in panels):
+        there = ", ".join(name for name in measured if not name.startswith("error_"))
+        drawn = "; ".join(f"{x} and {y}" for x, y in panels)
+        raise ValueError(f"--points: must hold both columns of a picture, {drawn}, and holds {there}")
+    return measured
+
+
+def draw_measured(axes, measured: Mapping[str, np.ndarray], x: str, y: str) -> bool:
+    """Draw measured points with their errors in a panel of two columns; return whether both were measured."""
+    if x not in measured or y not in measured:
+        return False
+    bars = {f"{axis}err": measured.get(f"error_{name}") for axis, name in (("x", x), ("y", y))}
+    style = {"fmt": "s", "ms": points(4.5), "mfc": "white", "mec": _BLACK, "mew": points(1), "ecolor": _BLACK}
+    axes.errorbar(measured[x], measured[y], **bars, **style, elinewidth=points(1), label="measured", zorder=4)
+    return True
 
 
 def _mark(axes, mark, place, seen: set) -> None:

@@ -20,6 +20,9 @@ def parser() -> Parser:
         help="a branch file (.h5), the folder of a diagram, a file of contin.save (.npz), or a folder of those",
     )  # fmt: skip
     parser.add_argument("-o", "--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
+    parser.add_argument(
+        "--points", metavar="CSV", help="measured points to show on the map: columns of the map by name in the first line"
+    )
     parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     return parser
 
@@ -28,7 +31,7 @@ def parser() -> Parser:
 def main(argv=None) -> int:
     """Run the command; the exit code."""
     options = parser().parse_args(argv)
-    from branches.explore.gather import gather, left_out
+    from branches.explore.gather import gather, left_out, measured
     from branches.explore.page import assemble
     from branches.store.files import check_name, prepare, write_bytes
 
@@ -36,6 +39,8 @@ def main(argv=None) -> int:
     check_name(path, (".html", ".htm"))
     prepare(path)
     data = gather(options.results, options.quiet)
+    if options.points:
+        data["measured"] = measured(options.points, data["axes"])
     page = assemble(data).encode()
     with interrupt.held():
         write_bytes(path, page)

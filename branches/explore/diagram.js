@@ -83,10 +83,20 @@ function indexTexts() {
 
 const QUIET = { type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false };
 
+/** Measured points with their errors, where both columns were measured. */
+function measured() {
+  const { [now.x]: x, [now.y]: y } = DATA.measured || {};
+  if (!x || !y) return [];
+  const bars = (name) => ({ array: DATA.measured[`error_${name}`], visible: `error_${name}` in DATA.measured, thickness: 1, width: 0 });
+  const marker = { symbol: SYMBOLS.measured[0], size: SYMBOLS.measured[1], color: colour("mark") };
+  return [{ ...QUIET, mode: "markers", x, y, error_x: bars(now.x), error_y: bars(now.y), marker }];
+}
+
 /** What is drawn of the branches themselves, in pictures too. */
 const branchTraces = (groups) => [
   ...overlayTraces(),
   ...groups.map((group) => ({ ...QUIET, name: group.key, x: group.x, y: group.y, line: strokeOf(group) })),
+  ...measured(),
 ];
 
 function diagramTraces() {

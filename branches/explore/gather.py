@@ -12,6 +12,7 @@ from branches.run.display import Progress
 from branches.run.executor import executor, run_jobs
 from branches.store.files import StoreError
 from branches.store.layout import CLOSED
+from branches.store.measured import read_points
 from branches.store.read import read_branch
 
 #: Ending of the files that `contin.save` writes.
@@ -49,6 +50,21 @@ def gather(results: list[str], quiet: bool = True) -> dict:
     if other := next((path for path in files.values() if path.suffix != STORED), None):
         raise StoreError(f"{str(other)!r} is of a strip, {str(stored[0])!r} is not; a page shows one kind of result")
     return profiles.gathered(stored)
+
+
+def measured(path: str, axes: list) -> dict[str, list]:
+    """Return the measured points of a file by columns of a map, whose ``axes`` are (name, title, brief).
+
+    Raises
+    ------
+    StoreError
+        See `branches.store.measured.read_points`; or two columns are missing.
+    """
+    units = {name: brief.partition(" [")[2].rstrip("]") if brief.startswith(name) else "" for name, _, brief, *_ in axes}
+    found = read_points(path, units)
+    if len([name for name in found if name in units]) < 2:
+        raise StoreError(f"--points {path!r}: must hold two columns of the map, of {', '.join(units)}")
+    return {name: [None if math.isnan(value) else value for value in values] for name, values in found.items()}
 
 
 def left_out(data: dict) -> list[dict]:

@@ -11,6 +11,7 @@ const SYMBOLS = {
   hopf: ["square", 9, "Hopf point", "■"],
   user: ["x", 8, "given value", "✕"],
   exact: ["star-open", 11, "fold of the exact solution", "☆"], // of an overlay
+  measured: ["square-open", 8, "measured", "□"],
 };
 
 const wave = (number) => colour(`wave${((number - 1) % WAVES) + 1}`);
@@ -84,6 +85,7 @@ function legendEntries(groups) {
     .filter((kind) => !hues.size || kinds.length > 1 || kind !== "unknown")
     .map((kind) => ({ text: STYLE_WORDS[kind], tint: hues.size ? colour("mark") : colour(kind), kind }));
   const there = new Set(marks().flatMap((mark) => (x(mark.x) && y(mark.y) ? [mark.kind] : [])));
+  if (measured().length) there.add("measured");
   const symbols = Object.keys(SYMBOLS).filter((kind) => there.has(kind));
   return [...colours, ...styles.reverse(), ...symbols.map((symbol) => ({ text: SYMBOLS[symbol][2], symbol }))];
 }

@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from branches.draw.picture import check_measured, draw_measured
 from branches.draw.style import CONJUGATE, LINES, NATURAL, NU, OTHER, area, colour_of, in_words, narrowed, points, smooth
 from branches.graph import disentangle as layered
 from branches.graph.closed import families, pieces, secondaries
@@ -94,7 +95,7 @@ class Line:
             first = last
 
 
-def figure(graph, law: str, nu: float, window=None, disentangle: bool = True, size: float | None = None):
+def figure(graph, law: str, nu: float, window=None, disentangle: bool = True, size: float | None = None, measured=None):
     """Return the diagram of one law and nu as a matplotlib figure.
 
     Parameters
@@ -107,13 +108,15 @@ def figure(graph, law: str, nu: float, window=None, disentangle: bool = True, si
         Add the panel where the heights between the circles are free (`branches.graph.disentangle`).
     size : float, optional
         Width in inches; by default 13, or 7.5 of one panel.
+    measured : mapping of str to ndarray, optional
+        Measured points: ``kappa_n`` and ``kappa_star`` (`branches.draw.picture.draw_measured`).
     """
-    usual = 13 if disentangle else 7.5
+    usual, measured = 13 if disentangle else 7.5, check_measured(measured or {}, [("kappa_n", "kappa_star")])
     with narrowed((size or usual) / usual):
-        return _figure(graph, law, nu, window or _window(graph, law, nu), disentangle, size or usual)
+        return _figure(graph, law, nu, window or _window(graph, law, nu), disentangle, size or usual, measured)
 
 
-def _figure(graph, law: str, nu: float, window, disentangle: bool, wide: float):
+def _figure(graph, law: str, nu: float, window, disentangle: bool, wide: float, measured):
     from matplotlib.figure import Figure
 
     found = lines(graph, law, nu)
@@ -130,7 +133,8 @@ def _figure(graph, law: str, nu: float, window, disentangle: bool, wide: float):
     for axes in panels:
         axes.set_xlabel(NATURAL, fontsize=points(13))
         axes.tick_params(labelsize=points(12))
-    handles = legend(graph, law, nu, window)
+    draw_measured(panels[0], measured, "kappa_n", "kappa_star")
+    handles = [*legend(graph, law, nu, window), *panels[0].get_legend_handles_labels()[0]]
     columns = 3 if max(len(handle.get_label()) for handle in handles) > _LONG else 5
     style = {"ncols": columns if disentangle else 2, "frameon": False, "fontsize": points(12)}
     result.legend(handles=handles, loc="outside lower center", **style)

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -142,9 +143,14 @@ class StoredBranch(ABC):
             return self.points[name]
         known = self.columns.all.get(name)
         if known is None or known.derived is None:
-            there = [*self.columns.shown(), *(one.name for one in self.columns.all.values() if one.derived)]
-            raise StoreError(f"there is no column {name!r} of numbers{meant(name, there)}; there are {', '.join(there)}")
+            near, there = meant(name, self._named), ", ".join(self._named)
+            raise StoreError(f"there is no column {name!r} of numbers{near}; there are {there}")
         return known.derived(self.points)
+
+    @property
+    def _named(self) -> list[str]:
+        """The columns that people name."""
+        return [*self.columns.shown(), *(one.name for one in self.columns.all.values() if one.derived)]
 
     @abstractmethod
     def place(self, row: int) -> str:
@@ -334,12 +340,17 @@ class StoredBranch(ABC):
 
     def plot(
         self, shapes: int = 6, width: float | None = None, x: str | None = None, y: str | None = None,
-        view: tuple[float, float] | None = None, size: float | None = None,
+        view: tuple[float, float] | None = None, size: float | None = None, points: str | Path | None = None,
     ):  # fmt: skip
-        """Return the result as a matplotlib figure; see `branches.draw.picture.figure`."""
-        from branches.draw.picture import figure
+        """Return the result as a matplotlib figure; see `branches.draw.picture.figure`.
 
-        return figure(self, shapes, width, x, y, view, size)
+        ``points`` is a file of measured points, which are drawn too (`branches.store.measured.read_points`).
+        """
+        from branches.draw.picture import figure
+        from branches.store.measured import read_points
+
+        measured = points and read_points(points, {name: self._unit(name) for name in self._named})
+        return figure(self, shapes, width, x, y, view, size, measured)
 
     def _repr_html_(self) -> str:
         """Return the branch as HTML, for a notebook: name, reason of its end, picture, labelled points."""

@@ -636,9 +636,12 @@ def test_page_of_a_network(tmp_path, root, browser):
     """Its strips and joints are drawn, its axes chosen, its stages played; a link to a state opens; also without WebGL."""
     path, page = tmp_path / "frame.h5", tmp_path / "frame.html"
     run_scene(load(root / "configs" / "network_portal.yaml"), path, Display(silent=True))
-    assert main([str(path), "--out", str(page)]) == 0
+    (tmp_path / "measured.csv").write_text("P,C_z,error_C_z\n1,0.5,0.1\n2,,\n")
+    assert main([str(path), "--out", str(page), "--points", str(tmp_path / "measured.csv")]) == 0
     branch = read_branch(path)
     browser.open(page, address="#branch=frame_2&point=15&y=C_z")
+    squares = "document.getElementById('diagram').data.filter(({marker}) => marker?.symbol === 'square-open').map(({y}) => y)"
+    assert browser.js(squares) == [[0.5, None]] and "measured" in browser.js("document.getElementById('legend').textContent")
     row = branch.points[branch.stage_of == 2][15]
     assert browser.js("[explore.now.branch.id, explore.now.s, explore.now.x, explore.now.y]") == ["frame_2", 15, "P", "C_z"]
     value = float(browser.js("document.querySelector('[data-value=C_z]').textContent").replace("\u2212", "-"))

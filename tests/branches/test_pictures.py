@@ -344,6 +344,41 @@ def test_a_size_or_style_that_is_none(arguments, said, call):
     assert call(plot.main, "x.h5", *arguments).err.startswith(f"error: {said}")
 
 
+def test_measured_points_are_drawn_over_a_branch_and_a_diagram(tmp_path, call, root, stroke):
+    """A table of a spreadsheet: semicolons, decimal commas, empty places and units; drawn where they are."""
+    from branches.store.measured import read_points
+
+    table = tmp_path / "measured.csv"
+    table.write_text("\ufeffstroke [m];F_stroke [N];error_F_stroke\n0,001;-0,5;0,1\n# a note\n0,002;;0,1\n", encoding="utf-8")
+    units = {"stroke": "m", "F_stroke": "N"}
+    found = read_points(table, units)
+    assert found["stroke"].tolist() == [0.001, 0.002] and np.array_equal(found["F_stroke"], [-0.5, np.nan], equal_nan=True)
+    for measured, drawn in ((found, 1), ({}, 0)):
+        axes = figure(stroke, 0, x="stroke", y="F_stroke", measured=measured).axes[0]
+        assert len(axes.containers) == drawn
+        assert sum(np.array_equal(line.get_xdata(), found["stroke"]) for line in axes.lines) == drawn
+    table.write_text("kappa_n,kappa_star\n2.6,1.04\n")
+    assert call(plot.main, root / "configs" / "m1_n2.yaml", "--points", table, "-o", tmp_path / "x.png").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("kappa_n,kapa_star\n1,2\n", "'kapa_star' (did you mean 'kappa_star'?) must be one of the columns kappa_n, kappa_star"),
+        ("kappa_n [1/m],kappa_star\n1,2\n", "kappa_n: is given in '1/m', and must be in no unit"),
+        ("kappa_n,kappa_star\n1\n", "line 2 has 1 values, and the first line names 2 columns"),
+        ("kappa_n,kappa_star\n1,x\n", "line 2: kappa_star: 'x' must be a number"),
+        ("kappa_n,kappa_n\n1,1\n", "the column 'kappa_n' is named twice"),
+        ("kappa_n\n1\n", "must hold both columns of a picture, kappa_n and kappa_star, and holds kappa_n"),
+        ("kappa_n,kappa_star\n", "must hold a line of names of columns and lines of numbers; it has 1 lines"),
+    ],
+)
+def test_measured_points_of_something_else_are_refused(text, said, tmp_path, call, root):
+    (tmp_path / "x.csv").write_text(text)
+    done = call(plot.main, root / "configs" / "m1_n2.yaml", "--points", tmp_path / "x.csv", "-o", tmp_path / "x.png")
+    assert done.returncode == 2 and said in done.err and done.err.count("\n") == 1 and not (tmp_path / "x.png").exists()
+
+
 def test_the_title_is_that_of_the_data(tmp_path):
     axes = drawn(tmp_path, "{title: 'Fig. 12a, ribbon', law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
     assert axes.get_title() == "flat rod, (m, n) = (3, 1), $\\nu$ = 0.3"
