@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -31,42 +29,34 @@ def read_points(path: str | Path, units: Mapping[str, str]) -> dict[str, np.ndar
     """
     what = f"--points {str(path)!r}"
     try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        lines = [line for line in enumerate(Path(path).read_text(encoding="utf-8-sig").splitlines(), 1) if line[1].strip()]
     except (OSError, UnicodeDecodeError) as error:
         told = absent(Path(path)) if isinstance(error, FileNotFoundError) else "it is not a readable text file"
         raise StoreError(f"{what}: {told}") from error
-    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    split = next((mark for mark in ";\t" if rows and mark in rows[0][1]), ",")
-    table = [(number, [each.strip() for each in row]) for number, line in rows for row in csv.reader([line], delimiter=split)]
-    if len(table) < 2:
-        raise StoreError(f"{what}: must hold a line of names of columns and lines of numbers; it has {len(table)} lines")
-    (_, heads), *body = table
-    names = [_name(what, head, units) for head in heads]
+    if len(lines) < 2:
+        raise StoreError(f"{what}: must hold a line of names of columns and lines of numbers; it has {len(lines)} lines")
+    split = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
+    names, found = [_name(what, head, units) for head in lines[0][1].split(split)], []
     if twice := [name for name in names if names.count(name) > 1]:
         raise StoreError(f"{what}: the column {twice[0]!r} is named twice")
-    for number, row in body:
-        if len(row) != len(names):
-            raise StoreError(f"{what}: line {number} has {len(row)} values, and the first line names {len(names)} columns")
-    return {
-        name: np.array([_number(f"{what}: line {number}: {name}", row[place], split) for number, row in body])
-        for place, name in enumerate(names)
-    }
+    for number, line in lines[1:]:
+        texts = [text.strip() for text in line.split(split)]
+        if len(texts) != len(names):
+            raise StoreError(f"{what}: line {number} has {len(texts)} values, and the first line names {len(names)} columns")
+        for name, text in zip(names, texts):
+            try:  # a decimal comma, where columns are not split at commas
+                found.append(float(text.replace(",", ".")) if text else np.nan)
+            except ValueError:
+                raise StoreError(f"{what}: line {number}: {name}: {text!r} must be a number") from None
+    return dict(zip(names, np.reshape(found, (-1, len(names))).T))
 
 
 def _name(what: str, head: str, units: Mapping[str, str]) -> str:
     """Return the name of a column in the first line; raise StoreError for one of nothing, or in another unit."""
-    name, _, unit = (part.strip() for part in head.rstrip("] ").partition("["))
+    name, _, unit = (part.strip(' "') for part in head.rstrip('] "').partition("["))
     of = name.removeprefix("error_")
     if of not in units:
         raise StoreError(f"{what}: {one_of(of, units, 'the columns ')}")
     if unit not in ("", units[of]):
         raise StoreError(f"{what}: {name}: is given in {unit!r}, and must be in {units[of] or 'no unit'}")
     return name
-
-
-def _number(what: str, text: str, split: str) -> float:
-    """Return a number, with a decimal comma where columns are not split at commas; nan for an empty text."""
-    try:
-        return float(re.sub(r"^([-+]?\d*),(?=\d)", r"\1.", text) if split != "," else text) if text else np.nan
-    except ValueError:
-        raise StoreError(f"{what}: {text!r} must be a number") from None

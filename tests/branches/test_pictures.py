@@ -349,7 +349,7 @@ def test_measured_points_are_drawn_over_a_branch_and_a_diagram(tmp_path, call, r
     from branches.store.measured import read_points
 
     table = tmp_path / "measured.csv"
-    table.write_text("\ufeffstroke [m];F_stroke [N];error_F_stroke\n0,001;-0,5;0,1\n# a note\n0,002;;0,1\n", encoding="utf-8")
+    table.write_text("\ufeffstroke [m];F_stroke [N];error_F_stroke\n0,001;-0,5;0,1\n\n0,002;;0,1\n", encoding="utf-8")
     units = {"stroke": "m", "F_stroke": "N"}
     found = read_points(table, units)
     assert found["stroke"].tolist() == [0.001, 0.002] and np.array_equal(found["F_stroke"], [-0.5, np.nan], equal_nan=True)
