@@ -50,12 +50,8 @@ def find_zero(
 
     Inverse quadratic interpolation through the last three places, the secant method with the Anderson-Björck rule where that
     leaves the bracket or the ``guess`` is missing, bisection where neither makes progress. Ends when the next step would be
-    below ``tolerance``, or when the values no longer fall: they are round-off.
-
-    Raises
-    ------
-    ConvergenceError
-        The function jumps: it has no zero between the two places.
+    below ``tolerance``, or when the values no longer fall: they are round-off. Raises ConvergenceError where the function
+    jumps: it has no zero between the two places.
 
     Examples
     --------
@@ -271,12 +267,7 @@ class Arc:
         return test.passed(self.before.value(test), self.trial.value(test))
 
     def at(self, distance: float) -> Trial:
-        """Return the point of the curve at a distance along the state's tangent.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """Return the point of the curve at a distance along the state's tangent; raise ConvergenceError where there is none."""
         if self._last is not None and self._last[0] == distance:
             return self._last[1]
         guess, factors = self.guess(distance), self.trial.factors if self._factors is None else self._factors
@@ -387,12 +378,7 @@ class Arc:
         return place, there
 
     def _corrected(self, guess: Array, row: Array, value: float) -> Trial:
-        """Return the point of the curve where a row has a value, with its tangent along the state's.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """Return the point of the curve where a row has a value, with its tangent along the state's; raise ConvergenceError if none."""
         system, state = self.state.system, self.state
         small = corrected_small(system, guess, row, value, self.newton)
         if small is None:

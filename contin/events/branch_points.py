@@ -218,9 +218,7 @@ class BranchPointSearch:
     def _apart(self, middle: float) -> bool:
         """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.
 
-        Raises
-        ------
-        ConvergenceError
+        Raises ConvergenceError where there is none.
         """
         arc, (count, _) = self.arc, self.count
         there = arc.at(middle)

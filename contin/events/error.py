@@ -100,10 +100,7 @@ def error(point: Solution, functional: Functional, apart: Apart = lambda a, b: n
 def _of_mesh(point: Solution, functional: Functional, here: Array, apart: Apart) -> Any:
     """Return what halving the mesh changes or, without one, finding the point once more.
 
-    Raises
-    ------
-    ConvergenceError
-        The point is not found there.
+    Raises ConvergenceError where the point is not found there.
     """
     system, carry = point.system.refined() or (point.system, np.array)
     return _FINER * apart(np.asarray(functional(Trial.without_tangent(system, _again(point, system, carry)))), here)

@@ -124,10 +124,7 @@ class Inspection:
     def special_points(self) -> list[SpecialPoint]:
         """The special points inside the step, in order.
 
-        Raises
-        ------
-        ConvergenceError
-            A point inside the step that is needed to tell is not found.
+        Raises ConvergenceError where a point inside the step that is needed to tell is not found.
         """
         found: list[SpecialPoint] = []
         if self.home is not None:

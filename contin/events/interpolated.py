@@ -108,9 +108,7 @@ class InterpolatedZero(Finding):
     def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.
 
-        Raises
-        ------
-        ConvergenceError
+        Raises ConvergenceError where there is none.
         """
         old = self.window
         state = standing_at(system, carry(old.state.x), carry(old.state.tangent), old.state.step)
@@ -183,10 +181,7 @@ def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
 def _interpolated(window: Window, points: Sequence[Trial], functions: Functions, count: int) -> InterpolatedZero:
     """Return the zero from the points at the nodes, by polynomials of so many coefficients.
 
-    Raises
-    ------
-    ConvergenceError
-        The functions have no common zero in the middle half of the window.
+    Raises ConvergenceError where the functions have no common zero in the middle half of the window.
     """
     values = np.array([[function(point) for function in functions] for point in points])
     test = _polynomial(window, values, count)

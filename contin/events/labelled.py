@@ -42,10 +42,7 @@ class Finding:
     def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> Any:
         """Return the same finding on another mesh, to which ``carry`` takes x.
 
-        Raises
-        ------
-        ConvergenceError
-            It was not found, or another one was.
+        Raises ConvergenceError where it was not found, or another one was.
         """
         raise NotImplementedError(f"a {type(self).__name__} has no equations")
 

@@ -134,12 +134,7 @@ class _Manifold:
         self.rows[:, : system.size] = phi * system.weights
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        """Return x (size,), beta (d,) and G (d, 1 + d) at coordinates s.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """Return x (size,), beta (d,) and G (d, 1 + d) at coordinates s; raise ConvergenceError where there is none."""
         system, size = self.system, self.system.size
         z = np.append(self.x0 + s @ self.phi, np.zeros(self.d))
         last = np.inf
@@ -194,7 +189,7 @@ class _Manifold:
 def locate_multiple_point(
     system: Discretization, x: Array, row: Array, dimension: int, newton: Newton = Newton()
 ) -> MultiplePoint:
-    """Return the multiple point near x, with the tangents of its branches.
+    """Return the multiple point near x, with the tangents of its branches; raise ConvergenceError where none was found.
 
     Parameters
     ----------
@@ -204,11 +199,6 @@ def locate_multiple_point(
         Borders F_x: the tangent of the branch times the weights.
     dimension : int
         d, the number of singular values that vanish.
-
-    Raises
-    ------
-    ConvergenceError
-        None was found.
     """
     with np.errstate(all="ignore"):
         manifold, s = _bordered(system, x, row, dimension, newton), np.zeros(1 + dimension)

@@ -155,12 +155,8 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Tr
     """Return a special point on a mesh with points where conditions that the solution decides switch.
 
     Returned last is how far its free parameters may be from their values: by how much they changed when mesh points were moved
-    there the last time, and what they change along the branch over the distance that its place is known to.
-
-    Raises
-    ------
-    ConvergenceError
-        It was not found on such a mesh, or the places do not settle.
+    there the last time, and what they change along the branch over the distance that its place is known to. Raises
+    ConvergenceError where it was not found on such a mesh, or the places do not settle.
     """
     trial, details, apart = found
     moves: Any = 0.0
@@ -179,10 +175,7 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Tr
 def _again(point: SpecialPoint, trial: Trial, details: object, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
     """Return the special point and its details on another mesh.
 
-    Raises
-    ------
-    ConvergenceError
-        It was not found, or another one was.
+    Raises ConvergenceError where it was not found, or another one was.
     """
     system, carry = finer
     known = _NEAREST if details is None and point.label == Label.BRANCH_POINT and point.test is None else finding_of(details)
@@ -210,12 +203,8 @@ _NEAREST = _Nearest()
 def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
     """Return the zero of a test function near x, by secants along the tangent; without one, x corrected.
 
-    Where the function is the value of a free parameter, that is held. Returned last is how far off the zero may lie.
-
-    Raises
-    ------
-    ConvergenceError
-        Newton's method fails, or there is no zero.
+    Where the function is the value of a free parameter, that is held. Returned last is how far off the zero may lie. Raises
+    ConvergenceError where Newton's method fails, or there is no zero.
     """
     distance, holds = 0.0, test is not None and test.holds_one_of(system.free)
     if holds:
@@ -256,12 +245,8 @@ def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple
     """Return the zero of a test function near ``here``, which is ``at(0)``, and how far off it may lie.
 
     Each secant goes through the place nearest to zero and the one looked at last. Where some in a row come no nearer, values
-    are round-off, and the slope of the first secant says how far that reaches; where it does not, it is looked for.
-
-    Raises
-    ------
-    ConvergenceError
-        Newton's method fails, or there is no zero.
+    are round-off, and the slope of the first secant says how far that reaches; where it does not, it is looked for. Raises
+    ConvergenceError where Newton's method fails, or there is no zero.
     """
     value = test.function(here)
     if value == 0:
@@ -313,10 +298,7 @@ def _stands_still_to(function: Callable[[float], float]) -> float:
 def _known_to(function: Callable[[float], float]) -> float:
     """Return the distance from which on a function grows on both sides of zero, with different signs.
 
-    Raises
-    ------
-    ConvergenceError
-        There is none: the function has no zero there, or is round-off.
+    Raises ConvergenceError where there is none: the function has no zero there, or is round-off.
     """
     apart, values = LOCATED, np.zeros(2)
     while apart <= _AWAY:

@@ -176,13 +176,7 @@ class Stationarity:
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:
-    """Return the derivatives of a column by x.
-
-    Raises
-    ------
-    ProblemError
-        They are not known.
-    """
+    """Return the derivatives of a column by x; raise ProblemError where they are not known."""
     found = system.column_gradient(x, column)
     if found is None:
         raise ProblemError(f"start: extrema of {column!r} are labelled on branches, but not followed: it is no integral")

@@ -88,10 +88,7 @@ class Watch:
     def doubt(self, inspection: Inspection) -> str:
         """Return why a step cannot be believed, as a clause; "" where it can.
 
-        Raises
-        ------
-        ConvergenceError
-            A point inside the step that is needed to tell is not found.
+        Raises ConvergenceError where a point inside the step that is needed to tell is not found.
         """
         home = inspection.home
         known = home is not None and home.is_located and not home.is_trivial  # what the equations say there is blurred
