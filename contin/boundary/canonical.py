@@ -83,11 +83,8 @@ class Canonical:
 def canonical(variation: Variation) -> Canonical:
     """Return the canonical equations of a variational problem.
 
-    Raises
-    ------
-    ProblemError
-        A function that cannot be differentiated, an energy that does not depend on a control, or end conditions that repeat
-        each other.
+    Raises ProblemError for a function that cannot be differentiated, an energy that does not depend on a control, or end
+    conditions that repeat each other.
     """
     ends = EndConditions(variation)
     inside = _Inside(variation, ends.sigmas)
@@ -272,10 +269,7 @@ class _Inside:
     def _searched(self, convex: Number) -> list[Number]:
         """Return the controls as the minimum of -H.
 
-        Raises
-        ------
-        ProblemError
-            The energy has no value where the search starts.
+        Raises ProblemError where the energy has no value where the search starts.
         """
         tape, v = self.tape, self.variation
         search = search_of(tape, [w.place for w in self.w], [convex.place], v.starts, True)

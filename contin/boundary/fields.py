@@ -275,9 +275,7 @@ class Fields(Spectral, Collocation):
     def check_solution(self, x: Array) -> None:
         """Check that the rates are linear functions of those of the states, and that perturbations do not grow without bound.
 
-        Raises
-        ------
-        ProblemError
+        Raises ProblemError otherwise.
         """
         batch, sizes = self.problem.batch("rates"), self.scales.states
         rates = generator("fields").uniform(1, 2, (self.gauss_times.size, self._n))

@@ -46,6 +46,8 @@ class OscillatingField(BoundaryValueProblem):
 def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]], times: int = TIMES) -> OscillatingField:
     """Return the problem of the time-periodic states of a field.
 
+    Raises ProblemError where the field has integral conditions, or boundary conditions that fill an array.
+
     Parameters
     ----------
     field : BoundaryValueProblem
@@ -54,11 +56,6 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
         The real and imaginary part of the critical vector over the domain, of each state whose rate occurs.
     times : int
         Odd.
-
-    Raises
-    ------
-    ProblemError
-        The field has integral conditions, or boundary conditions that fill an array.
     """
     if field.integrals is not None or argument_count(field.boundary) != 3:
         raise ProblemError(

@@ -302,12 +302,8 @@ class _Part(NamedTuple):
 def second_variation(system: Collocation, x: Array, phases: bool = True) -> SecondVariation | None:
     """Return the second variation at a solution x of a variational problem; None where Legendre's condition fails.
 
-    Without ``phases`` these conditions are not held.
-
-    Raises
-    ------
-    ProblemError
-        End conditions that repeat or contradict each other there.
+    Without ``phases`` these conditions are not held. Raises ProblemError for end conditions that repeat or contradict each
+    other there.
     """
     parts = []
     for own, jacobian in _jacobians(system, x):

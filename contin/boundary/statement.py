@@ -290,10 +290,7 @@ class BoundaryValueProblem(Restated):
 def _value_count(name: str, function: Function | None, signature: Signature, given: int | None) -> int:
     """Return how many values a function has; ``given`` is that number for one that fills an array.
 
-    Raises
-    ------
-    ProblemError
-        It does not take these arguments, or fills an array of unknown size.
+    Raises ProblemError where it does not take these arguments, or fills an array of unknown size.
     """
     if function is None and name == "integrals":
         return 0
@@ -416,12 +413,7 @@ class InSegments:
     def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
 
-        Others are returned as they are.
-
-        Raises
-        ------
-        ProblemError
-            Another number of them.
+        Others are returned as they are. Raises ProblemError for another number of them.
         """
         if not isinstance(guess, list) or not any(callable(g) or isinstance(g, (list, tuple, np.ndarray)) for g in guess):
             return guess
