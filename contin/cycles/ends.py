@@ -271,9 +271,7 @@ def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
 def _at_period(system: CycleCollocation, x: Array, at: int, less: float) -> tuple[float, float]:
     """Return the parameter p at a place of the unknowns, and dp/dT, at a period that is shorter by ``less``.
 
-    Raises
-    ------
-    ConvergenceError
+    Raises ConvergenceError where there is none.
     """
     row, of_period = np.zeros(system.size), system.parameter_index(PERIOD)
     p_size, size = system.free_scales[[i - system.state_size for i in (at, of_period)]]
@@ -342,9 +340,7 @@ def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
 def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:
     """Return the unknowns of the Hopf point near a small cycle, its frequency, and the errors of the free parameters.
 
-    Raises
-    ------
-    ConvergenceError
+    Raises ConvergenceError where there is none.
     """
     n, size = len(system.problem.state_names), system.state_size
     at, period = (
@@ -381,9 +377,7 @@ def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, A
 def _critical(system: CycleCollocation, x: Array, states: Array, expected: complex) -> complex:
     """Return the eigenvalue, nearest to an expected one, at the equilibrium that is put into ``states``, a view of x.
 
-    Raises
-    ------
-    ConvergenceError
+    Raises ConvergenceError where there is none.
     """
     here = nearest_zero(lambda u: (system.rates(x, u[None])[0], system.rates_by_states(x, u[None])[0]), states[0])
     if here is None:

@@ -359,10 +359,7 @@ class PeriodicCollocation(OfCycles, Collocation):
 class ForcedCollocation(PeriodicCollocation):
     """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.
 
-    Raises
-    ------
-    ProblemError
-        ``rounds`` is no whole number, or free; the period is no positive number.
+    Raises ProblemError where ``rounds`` is no whole number, or free; the period is no positive number.
     """
 
     autonomous = False
@@ -556,13 +553,7 @@ class CycleCollocation(PeriodicCollocation):
     # --- the reference -----------------------------------------------------------------------------------
 
     def with_reference(self, x: Array) -> Self:
-        """Return the same with the orbit x as the reference.
-
-        Raises
-        ------
-        ProblemError
-            It is constant.
-        """
+        """Return the same with the orbit x as the reference; raise ProblemError where it is constant."""
         if not np.ptp(self.states(x), axis=0).any():
             raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
         return self._referring_to(x)
@@ -598,12 +589,7 @@ class CycleCollocation(PeriodicCollocation):
         return abs(self.amplitude(z)) < COLLAPSED * abs(self.amplitude(x))
 
     def check_solution(self, x: Array) -> None:
-        """Check that a cycle that was looked for is none of no size.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """Check that a cycle that was looked for is none of no size; raise ConvergenceError otherwise."""
         if self.has_shrunk(x):
             place = self.states(x)[0]
             where = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(self.problem.state_names, place))

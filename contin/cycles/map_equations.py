@@ -77,11 +77,7 @@ class MapSystem(OfCycles, Algebraic):
                           [  -1                  A_k     B_k  ]
 
     Angles gain whole rounds, u_(k+1) = u_1 + `gain`. Columns are those of u_1; the norm is the root mean square over the cycle.
-
-    Raises
-    ------
-    ProblemError
-        ``rounds`` is no whole number, or free.
+    Raises ProblemError where ``rounds`` is no whole number, or free.
     """
 
     problem: Any

@@ -34,10 +34,7 @@ _MOST = 60
 def symmetry_matrix(symmetry: object, count: int) -> Array:
     """Return the matrix of a symmetry that is given as a matrix or as its diagonal.
 
-    Raises
-    ------
-    ProblemError
-        It is neither, the identity, or of no order up to 60.
+    Raises ProblemError where it is neither, the identity, or of no order up to 60.
     """
     try:
         given = np.array(symmetry, dtype=float)
@@ -52,13 +49,7 @@ def symmetry_matrix(symmetry: object, count: int) -> Array:
 
 
 def order_of(matrix: Array) -> int:
-    """Return the smallest n with S^n = 1.
-
-    Raises
-    ------
-    ProblemError
-        There is none up to 60.
-    """
+    """Return the smallest n with S^n = 1; raise ProblemError where there is none up to 60."""
     one, power = np.eye(len(matrix)), matrix
     for order in range(1, _MOST + 1):
         if np.abs(power - one).max(initial=0.0) <= LOCATED:
@@ -70,9 +61,7 @@ def order_of(matrix: Array) -> int:
 def check_equivariance(field: Function, matrix: Array, names: Sequence[str], parameters: Mapping[str, float]) -> None:
     """Check F(S u) = S F(u) at some places, with the default parameters; where the field has no value nothing is checked.
 
-    Raises
-    ------
-    ProblemError
+    Raises ProblemError otherwise.
     """
     if order_of(matrix) == 1:
         return
@@ -92,12 +81,7 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
 
 
 def check_lattice(matrix: Array, names: Sequence[str], angles: Mapping[str, float]) -> None:
-    """Check that S changes states by whole rounds of angles where an angle goes round once.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Check that S changes states by whole rounds of angles where an angle goes round once; raise ProblemError otherwise."""
     periods = np.array([angles.get(name, 0.0) for name in names])
     for name, period in angles.items():
         moved = period * matrix[:, names.index(name)]
@@ -502,12 +486,7 @@ def _with_mass(field: Function, mass: object, names: Sequence[str], forced: bool
 
 
 def _turn(symmetry: object, forced: bool, count: int) -> Array:
-    """Return the matrix of a symmetry, the identity where there is none.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Return the matrix of a symmetry, the identity where there is none; raises as `symmetry_matrix`."""
     if symmetry is None:
         return np.eye(count)
     if forced:
