@@ -429,10 +429,7 @@ class NetworkChain:
     def moved(self, change) -> NetworkChain:
         """Return the network with its unknowns changed by (n,), and joined and held again by the smallest further change.
 
-        Raises
-        ------
-        ValueError
-            The conditions cannot be met nearby.
+        Raises ValueError where the conditions cannot be met nearby.
         """
         failed = "the conditions at joints and supports cannot be met by a small change of the strains"
         return moved(self, change, lambda chain: chain._missed, lambda chain: chain._slopes, failed)
@@ -499,10 +496,7 @@ def unsupported(network: Network) -> str:
 def cut(network: Network, system: Collocation, x: np.ndarray, segments: int) -> NetworkChain:
     """Return the network of segments that has the strains of a state in the middle of each, joined and held.
 
-    Raises
-    ------
-    ValueError
-        It cannot be joined and held there: too few segments; or something is unsupported.
+    Raises ValueError where it cannot be joined and held there: too few segments; or something is unsupported.
     """
     if reason := unsupported(network):
         raise ValueError(f"{reason} is not cut into segments")

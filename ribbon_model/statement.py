@@ -239,10 +239,7 @@ class Statement:
     def problem(self) -> contin.SegmentedVariationalProblem:
         """The variational problem; its segments are the members, in their order.
 
-        Raises
-        ------
-        ProblemError
-            Conditions that repeat or contradict each other.
+        Raises ProblemError for conditions that repeat or contradict each other.
         """
         densities: dict[tuple, Callable] = {}
         segments, work, part = [], None, self._part
