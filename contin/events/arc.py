@@ -378,7 +378,10 @@ class Arc:
         return place, there
 
     def _corrected(self, guess: Array, row: Array, value: float) -> Trial:
-        """Return the point of the curve where a row has a value, with its tangent along the state's; raise ConvergenceError if none."""
+        """Return the point of the curve where a row has a value, with its tangent along the state's.
+
+        Raises ConvergenceError where there is none.
+        """
         system, state = self.state.system, self.state
         small = corrected_small(system, guess, row, value, self.newton)
         if small is None:
