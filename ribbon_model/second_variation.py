@@ -16,7 +16,6 @@ see docs/stability.md. v is free: two functions (three for a law without omega_2
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping
@@ -87,6 +86,8 @@ class Equilibrium:
         repeats: half a part of the loop where there is a mirror or an axis, else a part.
     degree : int
         Of that collocation, which is the discretization of the second variation, too.
+    inside : ndarray, shape (N, degree, 3, 3), optional
+        The directors at its Gauss points, where they are known.
     """
 
     law: Law
@@ -98,6 +99,7 @@ class Equilibrium:
     symmetry: Symmetry
     mesh: np.ndarray
     degree: int
+    inside: np.ndarray | None = None
 
     __repr__ = shown
 
@@ -135,15 +137,15 @@ def circle(law: Law, parameters: float | Mapping[str, float], m: int, kappa_n: f
 
     moment = np.array([0.0, 0.0, law.circle(m, kappa_n, parameters)["M1"]])
     piece, symmetry = LENGTH / (2 * m), Symmetry(order=m, mirror=True)
-    known, mesh = law.values(parameters), np.array([0, piece])
-    found = Equilibrium(law, known, kappa_n, directors, moment, np.zeros(3), symmetry, mesh, _CIRCLE_DEGREE)
-    strain, compliance = (values[0] for values in found.response(directors(np.zeros(1)) @ moment))
+    known, start = law.values(parameters), directors(np.zeros(1))
+    strain, compliance = (values[0] for values in law.linearized(start @ moment, kappa_n, *known.values()))
     if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
         raise ValueError(f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g} on the root that the law takes")
     softened = abs(moment[2]) * np.linalg.norm(compliance)
     highest = math.sqrt(m * m + m * softened + (0 if law.constrained else softened**2))
     intervals = math.ceil(piece * highest / _PHASE) + 1
-    return dataclasses.replace(found, mesh=np.linspace(0, piece, intervals + 1))
+    mesh = np.linspace(0, piece, intervals + 1)
+    return Equilibrium(law, known, kappa_n, directors, moment, np.zeros(3), symmetry, mesh, _CIRCLE_DEGREE)
 
 
 def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
@@ -166,7 +168,8 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
     axes, directors, symmetry = _UNFOLDED[domain](sample, p["length"])
     loads, known = (axes @ moment, axes @ force), {name: p[name] for name in law.parameters}
-    return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree)
+    inside = frames((tables.value @ local).reshape(-1, 4)).reshape(*local.shape[:1], degree, 3, 3) @ axes.T
+    return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, inside)
 
 
 def _whole(sample, length):
@@ -194,11 +197,11 @@ def _unfolded_half(between_axes: bool, sample, length):
 def _unfolded_cell(sample, length):
     """Return lab axes, directors and symmetry of a quarter wave: its image under the axis d2 at its end, then half waves."""
     first, last = sample(np.array([0.0, 1.0]))
-    normal = np.cross(first[2], last[1])
+    normal = cross_matrix(first[2]) @ last[1]
     if np.linalg.norm(normal) < levels.APART:  # no rotation from part to part, so any axis in the mirror plane can be taken
         normal = first[0]
     normal /= np.linalg.norm(normal)
-    axes = np.array([first[2], np.cross(normal, first[2]), normal])
+    axes = np.array([first[2], cross_matrix(normal) @ first[2], normal])
     axis = axes @ last[1]
     half_turn = 2 * np.outer(axis, axis) - np.eye(3)
     turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
@@ -206,10 +209,10 @@ def _unfolded_cell(sample, length):
     winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
     if abs(order * part / LENGTH - 1) > levels.APART or abs(winding - round(winding)) > _WINDING_DEFECT:
         raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
-    turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
     signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]
 
     def directors(stations):
+        turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
         s = np.mod(stations, LENGTH)
         number = np.minimum((s / part).astype(int), order - 1)
         s = np.clip(s - number * part, 0, part)

@@ -176,15 +176,15 @@ class _Points:
 def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     """Return the fields of an equilibrium at the Gauss points; the centreline is by the collocation's own quadrature."""
     tables, mesh = basis(equilibrium.degree), equilibrium.mesh
-    lengths = np.diff(mesh)
-    stations = mesh[:-1, None] + lengths[:, None] * tables.points
-    d = equilibrium.directors(stations.ravel()).reshape(*stations.shape, 3, 3)
+    lengths, d = np.diff(mesh), equilibrium.inside
+    if d is None:
+        stations = mesh[:-1, None] + lengths[:, None] * tables.points
+        d = equilibrium.directors(stations.ravel()).reshape(*stations.shape, 3, 3)
     ends = np.cumsum(lengths[:, None] * np.einsum("i,eik->ek", tables.weights, d[:, :, 2]), axis=0)
     inside = lengths[:, None, None] * np.einsum("ij,ejk->eik", tables.runge_kutta, d[:, :, 2])
     inside[1:] += ends[:-1, None]
     origin, gap = _origin(equilibrium.symmetry, ends[-1])
-    x = (inside + origin).reshape(-1, 3)
-    d = d.reshape(-1, 3, 3)
+    shape, x, d = inside.shape[:2], (inside + origin).reshape(-1, 3), d.reshape(-1, 3, 3)
     about = cross_matrix(equilibrium.force)
     momentum = equilibrium.moment - about @ origin
     moment = np.einsum("kij,kj->ki", d, momentum + x @ about.T)
@@ -198,7 +198,6 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     generator = np.concatenate([u, -np.tensordot(x, _CROSS, 1) @ u], axis=1)
     rate = (np.tensordot(moment, _CROSS, 1) @ strain[:, :, None])[:, :, 0] + d @ equilibrium.force @ _CROSS[2]  # M'
     motion = np.einsum("kab,ka->kb", factor, rate[:, free])
-    shape = stations.shape
     return _Points(lengths, generator.reshape(*shape, 6, -1), motion.reshape(*shape, -1), momentum, gap)
 
 
@@ -206,10 +205,17 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
     """Return x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
     if not symmetry.reverses:
         return np.zeros(3), float(np.linalg.norm(end))
-    start, middle = (np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry)))
-    rows, values = np.vstack([start, middle]), np.concatenate([np.zeros(3), -middle @ end])
-    origin = np.linalg.lstsq(rows, values, rcond=levels.DEPENDENT)[0]
-    return origin, float(np.linalg.norm(rows @ origin - values))
+    rows, inverse = _centring(symmetry)
+    values = rows[3:] @ end
+    origin = -inverse @ values
+    return origin, float(np.linalg.norm([rows[:3] @ origin, rows[3:] @ origin + values]))
+
+
+@functools.cache
+def _centring(symmetry: Symmetry) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows (6, 3) that vanish on x at both ends of the piece, and what takes values of the last three to x(0)."""
+    rows = np.vstack([np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry))])
+    return rows, np.linalg.pinv(rows, rcond=levels.DEPENDENT)[:, 3:]
 
 
 # --- symmetry -----------------------------------------------------------------------------------------------------------

@@ -175,7 +175,7 @@ def whole(at):
     """The same equilibrium, with its mesh on the whole loop and no symmetry known."""
     part = np.concatenate([at.mesh, 2 * at.mesh[-1] - at.mesh[-2::-1]])
     mesh = np.concatenate([part[:-1] + k * part[-1] for k in range(at.symmetry.order)] + [[LENGTH]])
-    return dataclasses.replace(at, symmetry=Symmetry(), mesh=mesh)
+    return dataclasses.replace(at, symmetry=Symmetry(), mesh=mesh, inside=None)
 
 
 LONGER = pytest.param(3, 4, ISOTROPIC_ROD, marks=pytest.mark.full)
