@@ -151,6 +151,7 @@ def fitted(network: Network, states: np.ndarray, values: dict[str, float], unkno
     """Return the values with those of the unknown numbers that fit the conditions at the ends best, and what is left."""
     problem, order = network.problem, list(network.problem.parameters)
     p = np.array([values.get(name, problem.parameters[name]) for name in order])
+    p[[order.index(f"sigma_{number + 1}") for number in network.contacts]] = -levels.APART  # what touches is held
     places = np.array([order.index(name) for name in unknown], dtype=np.int64)
     batch = problem.batch("boundary")
     missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.columns(places))

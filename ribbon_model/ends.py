@@ -62,6 +62,8 @@ class End:
         Of a joint: the number (0, 1, 2) of the director that stays perpendicular to the axis; or its parts on them.
     held : tuple of vectors
         Directions along which the place is prescribed.
+    pushes : bool
+        The support pushes along the only one of these, and cannot pull.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class End:
     axis: Vector = DIRECTIONS["width"]
     director: int | Vector = 0
     held: tuple[Vector, ...] = tuple(DIRECTIONS.values())
+    pushes: bool = False
 
     def __post_init__(self) -> None:
         import numpy as np
@@ -91,6 +94,7 @@ class End:
     def words(self) -> str:
         """What is held, in words, for titles and messages."""
         place = {3: "", 2: ", slides along a line", 1: ", slides in a plane", 0: ""}[len(self.held)]
+        place = ", pushed along a line" if self.pushes else place
         if not self.held:
             return "free" if self.rotation == FREE else f"{self.rotation}, free to move"
         return ("ball joint" if self.rotation == FREE else self.rotation) + place
@@ -244,6 +248,8 @@ class Roller:
         Arclength of this point, a multiple of 1/N for a whole number N up to 100.
     direction : tuple of float
         The strip's place there along it is the number ``roller``.
+    pushes : int
+        1 or -1: it pushes that way along the direction, and cannot pull; 0 holds to both sides.
 
     Raises
     ------
@@ -258,6 +264,7 @@ class Roller:
 
     at: float
     direction: Vector
+    pushes: int = 0
 
     def __post_init__(self) -> None:
         self.direction = unit("roller", self.direction)

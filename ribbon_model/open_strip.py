@@ -161,6 +161,11 @@ class OpenStrip(Network):
 
     # --- the problem --------------------------------------------------------------------------------------------------
 
+    @property
+    def contacts(self) -> dict[int, str]:
+        """As those of a network, the ends in the words of scenes."""
+        return {number: {FIRST: "start", LAST: "finish"}.get(name, name) for number, name in super().contacts.items()}
+
     def _functionals(self) -> Mapping[str, Callable]:
         """Return the place of the last end, as far as it is free."""
         return {name: rate for name, rate in _PLACES.items() if name not in self.parameters}
@@ -378,7 +383,7 @@ def _mirrored(t, x):
 
 def _support(end: End, *prescribed) -> Support:
     """Return an end as the support of a joint; ``prescribed`` are the further fields."""
-    return Support(end.rotation, end.axis, end.director, end.held, *prescribed)
+    return Support(end.rotation, end.axis, end.director, end.held, end.pushes, *prescribed)
 
 
 def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:

@@ -266,8 +266,15 @@ class Statement:
         phases = list(self.integrals)[: len(self.phases)]
         return contin.SegmentedVariationalProblem(
             segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
-            phases=self._named(phases), end_work=self._end_work(), symmetries=self.symmetries,
+            phases=self._named(phases), end_work=self._end_work(), symmetries=self.symmetries, pushes=self.contacts,
+            points=[*self.contacts],
         )  # fmt: skip
+
+    @property
+    def contacts(self) -> dict[int, str]:
+        """Names of the supports that push and cannot pull, by the numbers of their conditions, which come first."""
+        names = [name for name, end in self.held.items() if end.pushes]
+        return dict(enumerate([*names, *(["roller"] if self.roller and self.roller.pushes else [])]))
 
     def _functionals(self) -> Mapping[str, Callable]:
         """Return integrals over each member that are columns of points."""
@@ -347,10 +354,11 @@ class Statement:
         held = [(name, *self._prescribing(name, end)) for name, end in self.held.items()]
         floating = self._floating() if self.floats else None
         holding, begins = [each.holds for each in self.integrals.values()], self.begins
+        pushing, side = [name for name, end in self.held.items() if end.pushes], self.roller.pushes if self.roller else 0
         gaps, readers = self._gaps, {name: self._reader(joint) for name, joint in self.joints.items()}
 
         def conditions(a, b, p):
-            found = [_unit(x) for number, x in enumerate(a) if number not in begins.values()]
+            found, pushed = [_unit(x) for number, x in enumerate(a) if number not in begins.values()], []
             for name, joint in joints:
                 (first, origin), *others = readers[name](a, b, p)
                 before = first
@@ -368,10 +376,12 @@ class Statement:
                     found += [frame[0] - 1, *frame[1:]] if len(fixed) == 3 else [*fixed, _unit(a[begins[name]])]
                 else:
                     found += rotation(frame, frame_of(p))
-                found += position(place, place_of(p))
+                (pushed if name in pushing else found).extend(position(place, place_of(p)))
             found += [x[number] for number, _ in enumerate(holding, 7) for x in a]
-            found += [sum(x[number] for x in b) for number, holds in enumerate(holding, 7) if holds]
-            return found + (floating(a) if floating else [])
+            sums = [sum(x[number] for x in b) for number, holds in enumerate(holding, 7) if holds]
+            if side:
+                pushed.append(side * sums.pop())
+            return [*pushed, *found, *sums, *(floating(a) if floating else [])]
 
         return conditions
 

@@ -44,6 +44,7 @@ LABELS = {
     "LP": Label("fold", "fold", "*", FOLD, 170, told=True, singular=True),
     "BP": Label("branch point", "branch point", "o", END, 45, singular=True),
     "SB": Label("secondary bifurcation", "secondary bifurcation", "D", SECONDARY, 40, singular=True),
+    "BC": Label("contact", "contact", "v", USER, 40, singular=True),
     "UZ": Label("user value", "user value", "D", USER, 40),
     "EP": Label("end", "end", "o", END, 45),
     "MX": Label("end", "lost", "x", END, 40),

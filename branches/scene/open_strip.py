@@ -71,6 +71,7 @@ class EndConfig(Strict):
     place: Literal["held", "free"] = "held"
     slides_along: OwnDirection | None = None
     slides_in_plane: OwnDirection | None = Field(None, description="the normal of the plane")
+    only: Literal["pushes"] | None = Field(None, description="the plane pushes along its normal, and cannot pull")
 
     @model_validator(mode="after")
     def _fits(self):
@@ -81,6 +82,8 @@ class EndConfig(Strict):
             raise ValueError(_belongs("about", "hinged or joint", self.about, self.rotation))
         if (self.perpendicular is None) != (self.rotation != JOINT):
             raise ValueError(_belongs("perpendicular", "joint", self.perpendicular, self.rotation))
+        if self.only and self.slides_in_plane is None:
+            raise ValueError("only: belongs to slides_in_plane, along whose normal a support pushes")
         self.end()
         return self
 
@@ -89,7 +92,7 @@ class EndConfig(Strict):
         about, along, plane = (axes.get(one, one) for one in (self.about or "width", self.slides_along, self.slides_in_plane))
         held = tuple(DIRECTIONS.values()) if self.place == "held" else ()
         held = perpendicular(along) if along else (plane,) if plane else held
-        return End(self.rotation, about, axes[self.perpendicular or "width"], held)
+        return End(self.rotation, about, axes[self.perpendicular or "width"], held, bool(self.only))
 
     @property
     def words(self) -> dict[str, str]:
@@ -135,6 +138,7 @@ class RollerConfig(Strict):
 
     at: float = Field(gt=0, lt=1, description="where along the strip, over its length")
     held: Direction = Field(DIRECTIONS["normal"], description="direction in which the place is held")
+    only: Literal["pushes"] | None = Field(None, description="it pushes to where it moves, or along held, and cannot pull")
 
 
 class DimensionsConfig(Strict):
@@ -482,21 +486,25 @@ class OpenScene(StagedScene):
         """Return the state from which the first stage starts, and ''; raise ConfigError where there is none."""
         from contin import ProblemError
 
-        strip, intervals, values = self.strip(), self.mesh.intervals, None
+        try:
+            strip, intervals = self.strip(), self.mesh.intervals
+            guess, values = self._guess(strip)
+            intervals = strip.roller.intervals(intervals) if strip.roller else intervals
+            return strip.first_point(guess, values, intervals, **options), ""
+        except (ProblemError, ValueError) as error:
+            raise ConfigError(f"begin: {self.begin}: {error}") from error
+
+    def _guess(self, strip: Any) -> tuple[Any, dict[str, float]]:
+        """Return the first guess, and the place of a roller that touches the strip where that is."""
         turn = strip.parameters.get("turn", 0.0)
         guesses = {
             "natural": lambda: None, "arch": lambda: strip.arch(), "arch, other side": lambda: strip.arch(side=-1.0),
             "circle": lambda: strip.twisted_circle(turn / math.pi), "twisted": lambda: strip.twisted(turn),
         }  # fmt: skip
-        try:
-            guess, roller = guesses[self.begin](), strip.roller
-            if roller is not None:
-                intervals = roller.intervals(intervals)
-                if guess is not None and "roller" not in self.numbers:  # it touches the strip where it is
-                    values = {"roller": sum(x * y for x, y in zip(guess(roller.at)[4:7], roller.direction))}
-            return strip.first_point(guess, values, intervals, **options), ""
-        except (ProblemError, ValueError) as error:
-            raise ConfigError(f"begin: {self.begin}: {error}") from error
+        guess, roller = guesses[self.begin](), strip.roller
+        if roller is None or guess is None or "roller" in self.numbers:
+            return guess, {}
+        return guess, {"roller": sum(x * y for x, y in zip(guess(roller.at)[4:7], roller.direction))}
 
     def natural_unit(self, name: str) -> str:
         """Return what a number is divided by: powers of the length L and the bending modulus B; '' for ratios."""
@@ -531,7 +539,13 @@ class OpenScene(StagedScene):
         for name in itertools.chain.from_iterable((stage.follow, *stage.numbers) for stage in self.stages):
             if name in (STROKE, *LOADS) and name in known:
                 numbers.setdefault(name, 0.0)
-        return OpenStrip(material, *ends, numbers, *directions, *more)
+        strip = OpenStrip(material, *ends, numbers, *directions, *more)
+        if self.roller is None or self.roller.only is None:
+            return strip
+        begins = {**strip.parameters, **self._guess(strip)[1]}["roller"]
+        to = next((one.to / self.factor("roller") for one in self.stages if one.follow == "roller"), math.inf)
+        roller = Roller(self.roller.at, self.roller.held, -1 if to < begins else 1)
+        return OpenStrip(material, *ends, numbers, *directions, more[0], roller)
 
     @property
     def law_name(self) -> str:

@@ -365,7 +365,7 @@ class EndConditions:
         self.values = [*self.conditions]
         for number in v.pushes:
             gap, force = self.conditions[number], -dict(zip(free, sigma))[number]
-            self.values[number] = tape.apply("select", gap - force < 0, gap, force)
+            self.values[number] = tape.apply("select", force - gap < 0, force, gap)  # what touches without force is held
         self.values += [starting[i] - by[i] for i in range(n) if i not in fixed[0]]
         self.values += [ending[i] + by[n + i] for i in range(n) if i not in fixed[1]]
 

@@ -225,7 +225,7 @@ class VariationalProblem(BoundaryValueProblem):
         recording, found = recorded.recording, {}
         labels = [*(f"{end}.{state}" for end in "ab" for state in self.state_names), *self.parameters]
         for number, name in self.variation.pushes.items():
-            decides, gap, _ = recording.tape.operations[recording.results[number]].operands
+            decides, _, gap = recording.tape.operations[recording.results[number]].operands
             found[decides] = name or recording.tape.lines([gap], dict(zip(recording.inputs, labels)))[-1]
         return found
 
@@ -234,7 +234,7 @@ class VariationalProblem(BoundaryValueProblem):
         known = system if system.sides.size or not self.contacts else with_outcomes(system, x)
         origins = self.batch("boundary").conditions(known._free)
         sides = known.sides[known.sides.size - len(origins) :]
-        return tuple(self.contacts[origin] for origin, side in zip(origins, sides) if origin in self.contacts and side < 0)
+        return tuple(self.contacts[origin] for origin, side in zip(origins, sides) if origin in self.contacts and side > 0)
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the second variation says of a solution."""

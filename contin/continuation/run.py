@@ -32,7 +32,7 @@ from contin.core.step import Reason, State, Stop
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
-from contin.events.corner import Way, conditions, corner_at, refrozen
+from contin.events.corner import Way, conditions, corner_at, on_mesh_of, refrozen
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.events.watch import Watch
@@ -268,7 +268,8 @@ class Continuation:
             yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
         if ways:
             at, accepted = corner or point, state.accepted + 1
-            behind = on_branch(ways[0].system, at.trial.x, ways[0].tangent, settings, False)
+            hit = self._conditions.index(point.test)
+            behind = on_branch(*on_mesh_of(state.system, ways[0], at.trial.x, hit), settings, False)
             length, step = state.arclength + at.at, min(state.step, settings.step) if corner else state.step
             self.go_on((dataclasses.replace(behind, arclength=length, step=step, accepted=accepted), None))
             left = np.concatenate([at.trial.x, ways[0].tangent])

@@ -476,7 +476,7 @@ class Composed(System):
         name, at = [(name, at) for name in self._functions for at in range(len(self._origins(name)))][k]
         batch, origins, states = self.problem.batch(name), self._origins(name), self.problem.states
         if contact := getattr(self.problem, "contacts", {}).get(origins[at]) if batch.signature.ends else None:
-            return f"{contact} {'touches' if side < 0 else 'lifts off'}"
+            return f"{contact} {'touches' if side > 0 else 'lifts off'}"
         if known := source(batch, origins[at]):
             return known
         labels = [f"{end}.{state}" for end in "ab" for state in states] if batch.signature.ends else states

@@ -258,6 +258,16 @@ def corner_at(point: SpecialPoint, came: Array, hit: int, primary: str) -> tuple
     ), leading
 
 
+def on_mesh_of(system: Any, way: Way, x: Array, hit: int) -> tuple[Any, Array, Array]:
+    """Return the system of a way from the corner x on the mesh of a system, and the corner and the unit tangent there."""
+    if not system.intervals:
+        return way.system, x, way.tangent
+    there = system.with_sides(way.system.sides)
+    carry = way.system.carrier(there)
+    x = _polished(there, carry(x), hit)
+    return there, x, linearization(there, x, there.weights * carry(way.tangent)).tangent
+
+
 def _polished(system: Any, x: Array, hit: int) -> Array:
     """Return the point at which a number is zero."""
     for _ in range(3):

@@ -816,3 +816,28 @@ def test_a_frame_buckles_alike_in_all_units(L, B):
     (point,) = branch.labelled("BP")
     assert (point["P"], point.index_change) == (pytest.approx(force * 2.71645974768613**2, rel=1e-9), (0, 1))
     assert len(branch) < 20
+
+
+#: A cantilever above a stop, which pushes.
+STOP = """
+material: {law: rod, B1: 1, B2: 100, C: 1}
+strips: {beam: {begin: [0, 0, 0], end: [1, 0, 0], normal: y}}
+joints: {A: [beam start], tip: [beam finish]}
+held: {A: clamped, tip: {rotation: free, slides_in_plane: [0, 1, 0], only: pushes}}
+numbers: {tip_dy: -0.2, load: 0}
+loads: {load: {tip: [0, -1, 0]}}
+stages: [{follow: load, to: 5}, {follow: load, to: 0.1}]
+"""
+
+
+def test_a_stop_under_a_tip(tmp_path):
+    """It is met at the load of the free tip at this depth (Bisshopp & Drucker 1945), and left there; its force is the rest."""
+    assert run_scene(parse(STOP, "scene"), tmp_path / "stop.h5", Display(silent=True)) == "complete"
+    branch = read_branch(tmp_path / "stop.h5")
+    met, left = branch.events[branch.events["label"] == b"BC"]
+    assert (met["name"], left["name"]) == (b"tip touches: goes on", b"tip lifts off: goes on")
+    assert met["load"] == pytest.approx(0.6258923107865, rel=1e-10) == left["load"]
+    pressed = branch.points[branch.points["load"] == 5][0]
+    assert pressed["F_tip_y"] == pytest.approx(5 - 0.6258923107865, rel=1e-9) and branch.points["F_tip_y"].min() > -1e-9
+    with pytest.raises(ConfigError, match="held.A: only: belongs to slides_in_plane"):
+        parse(STOP.replace("A: clamped", "A: {only: pushes}"), "scene")

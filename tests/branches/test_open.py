@@ -326,17 +326,24 @@ def test_points_that_later_stages_miss(tmp_path):
 
 @pytest.mark.full
 def test_an_arch_under_a_roller(root, tmp_path):
-    """Symmetric about its middle until it leaves for the branch on which it snaps through; then its second mode grows."""
+    """Symmetric about its middle until it leaves for the branch on which it snaps through; then its second mode grows.
+
+    It meets the roller where the first state touches it, and leaves it where the force is zero: at half of the way by symmetry.
+    """
     path = tmp_path / "roller.h5"
     assert run_scene(load(root / "configs" / "open_roller.yaml"), path, Display(silent=True)) == "complete"
     branch = read_branch(path)
     (first, *_) = branch.events[branch.events["label"] == b"BP"]
     assert (first["index_before"], first["index_after"]) == (0, 1)
     through = branch.points[branch.points["stage"] == 2]
-    assert set(through["index"][2:]) == {0} and through["roller"][-1] == pytest.approx(-0.05)
-    assert np.interp(0.0, through["roller"][::-1], through["F_roller"][::-1]) == pytest.approx(0.0, abs=1e-3)
-    shape = branch.shape(len(branch.points) - 1)
-    assert np.interp(0.5, shape.arclength, shape.centreline[:, 1]) == pytest.approx(-0.05, abs=1e-9)
+    met, lost, left = branch.events[branch.events["label"] == b"BC"]
+    assert met["name"] == b"roller touches: goes on" and met["roller"] == pytest.approx(0.0894671648, abs=1e-9)
+    assert lost["name"] == left["name"] == b"roller lifts off: fold" and (left["index_before"], left["index_after"]) == (0, 1)
+    assert left["roller"] == pytest.approx(0.0, abs=1e-9) and abs(left["F_roller"]) < 1e-9 and lost["roller"] < 0
+    last = int(np.argmin(through["roller"]))
+    assert set(through["index"][2:last]) == {0} and through["F_roller"].max() < 1e-9
+    shape = branch.shape(int(np.flatnonzero(branch.points["stage"] == 2)[last]))
+    assert np.interp(0.5, shape.arclength, shape.centreline[:, 1]) == pytest.approx(0.0, abs=1e-9)
     sums = through["F_normal"] + through["start_F_normal"] + through["F_roller"]
     assert np.abs(sums).max() < 1e-8
 

@@ -105,3 +105,18 @@ def test_mistakes_are_told_in_one_sentence():
         Roller(0.123456789, NORMAL)
     with pytest.raises(ValueError, match="roller: the place of the first end must be held"):
         OpenStrip(ROD, FREE_END, CLAMP, roller=Roller(0.5, NORMAL))
+
+
+def test_a_roller_that_pushes_lifts_off_where_one_that_holds_would_pull():
+    """Its force is that of the other one while it pushes; a strip under it lies where nothing holds it behind that."""
+    rod = section_of("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    holds, strip = (OpenStrip(rod, numbers={"distance": 0.9}, roller=Roller(0.5, NORMAL, pushes)) for pushes in (0, -1))
+    first, held = (each.first_point(each.arch(), {"roller": 0.193}, **MESH) for each in (strip, holds))
+    force = strip.reactions(first)["F_roller"]
+    assert force == pytest.approx(holds.reactions(held)["F_roller"], rel=1e-9) and force < 0
+    branch = contin.trace(first, free=["roller"], limits={"roller": (0.15, 0.25)}, mesh=MESH["mesh"])
+    (left,) = branch.labelled("BC")
+    assert left.name == "roller lifts off: goes on" and left.index_change == (0, 0) and branch[-1].contacts == ()
+    free = OpenStrip(rod, numbers={"distance": 0.9})
+    arch = free.first_point(free.arch(), **MESH)
+    assert left["roller"] == pytest.approx(float(arch.system.evaluate(arch.x, np.array([0.5]))[0, 5]), abs=1e-9)
