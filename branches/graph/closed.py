@@ -45,10 +45,20 @@ def part(branch, file: str, numbers: object = None) -> Part:
 
 
 def add_branch(graph, branch, name: str) -> bool:
-    """Add a stored branch to the diagram; ``name`` is its file, which every edge carries.
+    """Add a stored branch to the diagram.
 
-    Return False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each domain,
-    and its images under the symmetries of the primary branch.)
+    Parameters
+    ----------
+    graph : networkx.MultiGraph
+    branch : branches.store.branch.StoredBranch
+    name : str
+        Its file; every edge carries it.
+
+    Returns
+    -------
+    bool
+        False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
+        domain, and its images under the symmetries of the primary branch.)
     """
     if not branch.config["origin"]:
         return add(graph, part(branch, name))
@@ -203,7 +213,10 @@ def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[
 def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
     """Return the special points along the branch (m, n), in order from the m-covered circle, for the given law and nu or all.
 
-    Raises KeyError where the diagram has no such branch.
+    Raises
+    ------
+    KeyError
+        The diagram has no such branch.
     """
     result = []
     for (law_, nu_, _, n_), nodes in courses(graph):
@@ -309,11 +322,21 @@ def describe_node(node) -> str:
 
 
 def preview(scene: Scene | Sweep, step: float = 0.2):
-    """Return the preview of a diagram of closed strips as a networkx.MultiGraph; it is never mixed with computed branches.
+    """Return the preview of the diagram of a scene, which is never mixed with computed branches.
 
-    ``step`` is the largest distance between points, as for `ribbon_model.exact.curve`. The arclength of its edges is that in
-    the plane of the quadrature's unknowns; ``exact`` holds the points of the quadrature. A branch whose quadrature fails is
-    listed, with the reason, in ``graph.graph["failed"]``.
+    Parameters
+    ----------
+    scene : Scene or Sweep
+        Of closed strips.
+    step : float
+        Largest distance between points, as for `ribbon_model.exact.curve`.
+
+    Returns
+    -------
+    networkx.MultiGraph
+        As from `branches.run.many.run_many`. The arclength of its edges is that in the plane of the quadrature's unknowns;
+        ``exact`` holds the points of the quadrature. A branch whose quadrature fails is listed, with the reason, in
+        ``graph.graph["failed"]``.
     """
     graph, failed = new_graph(scene.title), {}
     for one in sorted(scene.scenes.values(), key=lambda one: one.n * one.m):

@@ -38,9 +38,15 @@ if TYPE_CHECKING:
 def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool = False, overwrite: bool = False) -> str:
     """Follow the stages of ``scene`` into the file ``path``, telling ``display`` about it.
 
-    Return "complete", "interrupted" (Ctrl-C or SIGTERM; the file can be resumed), or "lost" (no further state was found).
-    Raises StoreError or ConfigError for a result file that cannot be written, that another run is writing, or that belongs to
-    another scene.
+    Returns
+    -------
+    str
+        "complete", "interrupted" (Ctrl-C or SIGTERM; the file can be resumed), or "lost" (no further state was found).
+
+    Raises
+    ------
+    StoreError, ConfigError
+        A result file that cannot be written, that another run is writing, or that belongs to another scene.
     """
     path = Path(path)
     with _writing(path, display, resume) as resume:

@@ -29,7 +29,10 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
     """Return the scene of a YAML file, changed by ``key=value`` settings (dotted keys, YAML values).
 
-    Raises ConfigError for a file that cannot be read, or a field that is unknown, of the wrong type or invalid.
+    Raises
+    ------
+    ConfigError
+        A file that cannot be read, or a field that is unknown, of the wrong type or invalid.
     """
     try:
         with open(path, "rb") as file:
@@ -133,7 +136,10 @@ def dump(scene: Scene | Sweep) -> str:
 def difference(stored: Scene, scene: Scene, ignored: Sequence[str] = ()) -> str:
     """Return the first field in which the scene of a file differs from another scene, in words; '' if they agree.
 
-    Fields that are ``ignored`` may differ: ``title``, or ``steps.max_points`` for one inside another.
+    Parameters
+    ----------
+    ignored : sequence of str
+        Fields that may differ: ``title``, or ``steps.max_points`` for one inside another.
     """
     if stored.KIND != scene.KIND:
         return f"a {stored.KIND} there, a {scene.KIND} here"

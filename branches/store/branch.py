@@ -138,7 +138,13 @@ class StoredBranch(ABC):
         return s
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column of the table of points, or one that follows from others; raise StoreError where there is none."""
+        """Return a column of the table of points, or one that follows from others.
+
+        Raises
+        ------
+        StoreError
+            There is none.
+        """
         if name in self.points.dtype.names and self.points.dtype[name].kind in "if":
             return self.points[name]
         known = self.columns.all.get(name)
@@ -221,7 +227,10 @@ class StoredBranch(ABC):
     def states_at(self, point: int) -> tuple[np.ndarray, np.ndarray]:
         """Return places t (K,) and states (K, n) of a kept point.
 
-        Raises StoreError where the solution of this point is not kept.
+        Raises
+        ------
+        StoreError
+            The solution of this point is not kept.
         """
         row = self._kept(point)
         here = slice(row["start"], row["start"] + row["count"])

@@ -19,7 +19,10 @@ from branches.store.writer import open_branch
 def read_branch(path: str | Path) -> StoredBranch:
     """Return the branch in a file.
 
-    Raises StoreError as `branches.store.writer.open_branch`, and where this version does not know its scene.
+    Raises
+    ------
+    StoreError
+        See `branches.store.writer.open_branch`; or this version does not know its scene.
     """
     with open_branch(Path(path)) as file:
         return _branch(file, str(path))
