@@ -25,11 +25,11 @@ from branches.scene.open_strip import (
     DimensionsConfig,
     EndWords,
     FollowConfig,
+    Material,
     OpenMesh,
     OwnDirection,
     Phases,
     StagedScene,
-    finite,
 )
 from contin.lowlevel import meant, one_of
 from ribbon_model.changed_supports import replacing
@@ -166,8 +166,8 @@ class NetworkScene(StagedScene):
     SUPPORTS: ClassVar[str] = "held"
 
     title: str = ""
-    material: dict[str, float | int | str] | None = Field(None, description="law, and its numbers, of all strips")
-    sections: dict[str, dict[str, float | int | str]] = Field(default_factory=dict, description="several of these, by name")
+    material: Material | None = Field(None, description="law, and its numbers, of all strips")
+    sections: dict[str, Material] = Field(default_factory=dict, description="several of these, by name")
     dimensions: DimensionsConfig | None = Field(None, description="of the strips, whose unit in computations is their length")
     along: Along = Field(
         default_factory=dict, description="data along strips, with s from 0 to 1: expressions, or tables of [s, value]"
@@ -186,16 +186,6 @@ class NetworkScene(StagedScene):
     mesh: OpenMesh = OpenMesh(degree=6)
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _infinite(cls, values: object) -> Any:
-        """Let B2 be infinite, which other numbers must not be."""
-        if not isinstance(values, dict):
-            return values
-        sections = values.get("sections")
-        found = {"sections": {name: finite(one) for name, one in sections.items()}} if isinstance(sections, dict) else {}
-        return values | found | ({"material": finite(values["material"])} if "material" in values else {})
 
     @model_validator(mode="after")
     def _fits(self):

@@ -240,6 +240,14 @@ def _expression(value: object) -> Any:
 Along = dict[str, Annotated[str, BeforeValidator(_expression)]]
 
 
+def _finite(section: object) -> Any:
+    """Return the fields of a section with an infinite B2 as text: other numbers must be finite."""
+    return section | {"B2": "inf"} if isinstance(section, dict) and section.get("B2") == math.inf else section
+
+
+Material = Annotated[dict[str, float | int | str], BeforeValidator(_finite)]
+
+
 class OpenMesh(MeshConfig):
     """Fields of the mesh."""
 
@@ -424,7 +432,7 @@ class OpenScene(StagedScene):
     )  # fmt: skip
 
     title: str = ""
-    material: dict[str, float | int | str] = Field(description="law, and its numbers")
+    material: Material = Field(description="law, and its numbers")
     dimensions: DimensionsConfig | None = None
     along: Along = Field(default_factory=dict, description="data along the strip: expressions in s, or tables of [s, value]")
     start: EndWords = EndConfig()
@@ -448,14 +456,6 @@ class OpenScene(StagedScene):
         read = {"numbers": _in_si_units("numbers", values["numbers"])} if "numbers" in values else {}
         stages = values["stages"]
         return values | read | {"stages": [_stage_in_si_units(one) for one in stages] if isinstance(stages, list) else stages}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _infinite(cls, values: object) -> Any:
-        """Let B2 be infinite, which other numbers must not be."""
-        return (
-            values | {"material": finite(values["material"])} if isinstance(values, dict) and "material" in values else values
-        )
 
     @model_validator(mode="after")
     def _fits(self):
@@ -558,11 +558,6 @@ class OpenScene(StagedScene):
             twists = self.closed.half_twists
             return f"{law}, closed with {twists} half twist{'s' * (abs(twists) != 1)}"
         return f"{law}, {self.strip().start.words} and {self.strip().finish.words}"
-
-
-def finite(section: object) -> Any:
-    """Return the fields of a section with an infinite B2 as text: other numbers must be finite."""
-    return section | {"B2": "inf"} if isinstance(section, dict) and section.get("B2") == math.inf else section
 
 
 def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:
