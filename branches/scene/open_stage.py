@@ -332,13 +332,14 @@ class OpenStage(Stage):
         tag = f"{names[at][0]} {sum(label == names[at][0] for label, name in names[: at + 1] if name != START)}"
         before = f"stage: {self.number} and " if self.number < len(self.scene.stages) else ""
         way = f"a stage with {before}start_at: {tag} follows the branch that leaves there"
-        if own[at]["kernel"] != 1:
-            way = "several modes are neutral there; a phase or an imperfection tells them apart"
-        if names[at][0] == Label.FOLD:
+        if names[at][0] == Label.FOLD or names[at][1].endswith("fold"):
             way = "the branch turns back there, and what is pushed further snaps"
-        here, *again = (
-            self._shown(self.follow, event[self.follow]) for event in own[at:] if event is own[at] or event["index_after"] == 0
-        )
+        elif names[at][0] == Label.CORNER:
+            way = "other contacts hold there"
+        elif own[at]["kernel"] != 1:
+            way = "several modes are neutral there; a phase or an imperfection tells them apart"
+        name, shown = self.follow, [event for event in own[at:] if event is own[at] or event["index_after"] == 0]
+        here, *again = (self._shown(name, event[name] * (not abs(event[name]) < event[f"error_{name}"])) for event in shown)
         until = f", stable again from {again[0]} on" if again else ""
         return [*lines, f"stage {self.number}: unstable beyond {here} ({tag}){until}: {way}"]
 
