@@ -1,1 +1,1 @@
-"""``python -m branches.strip``: the states of closed strips of given dimensions, in SI units."""
+"""``python -m branches.strip``: states of closed strips of given dimensions and snap loads of arches, in SI units."""

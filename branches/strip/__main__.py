@@ -12,7 +12,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from branches.scene.fields import ConfigError
 from branches.scene.units import STRIP_UNITS
 from branches.store.command import Parser, Quantity, answered, write_output
 from branches.store.files import check_picture
@@ -30,10 +29,16 @@ def parser() -> Parser:
         "in SI units, or have a unit.",
     )
     for name, unit in STRIP_UNITS.items():
-        more = "; inf for a straight strip" if name == "natural_radius" else ""
+        closed = name == "natural_radius"
         parser.add_argument(
-            f"--{name.replace('_', '-')}", type=Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
-        )
+            f"--{name.replace('_', '-')}", type=Quantity(unit), required=not closed, metavar="X",
+            help=f"{_HELP[unit]}{'; inf for a straight strip; of closed strips only' if closed else ''}",
+        )  # fmt: skip
+    parser.add_argument(
+        "--distance", type=Quantity("m"), metavar="X", help="of the ends of an open strip: an arch, pushed until it snaps"
+    )
+    parser.add_argument("--ends", choices=("clamped", "hinged"), help="how they are held (default: clamped)")
+    parser.add_argument("--push-at", type=float, metavar="PART", help="where it is pushed, over its length (default: 0.5)")
     parser.add_argument("--yield-strain", type=Quantity(""), metavar="X", help="mark states with a larger strain, as in 0.2%%")
     parser.add_argument(
         "--want", type=Quantity("J"), metavar="J", help="which dimensions give a stable loop with a barrier of J, or 5mJ"
@@ -44,22 +49,25 @@ def parser() -> Parser:
     return parser
 
 
-@answered()
+@answered(ValueError)
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the answer; return the exit code: 0, or 2 for an invalid strip."""
     options = vars(parser().parse_args(argv))
-    asked = {name: options.pop(name) for name in ("yield_strain", "want", "chart", "turns", "quiet")}
-    try:
-        _check(asked)
-        strip = Strip(**options)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
-    _answer(strip, asked)
+    names = ("yield_strain", "want", "chart", "turns", "quiet", "distance", "ends", "push_at")
+    asked = {name: options.pop(name) for name in names}
+    _check(asked, options["natural_radius"])
+    _answer(Strip(**(options if asked["distance"] is None else options | {"natural_radius": math.inf})), asked)
     return 0
 
 
-def _check(asked: dict) -> None:
+def _check(asked: dict, natural_radius: float | None) -> None:
     """Raise for an option that cannot be used."""
+    closed = asked["distance"] is None
+    for name in ("ends", "push_at") if closed else ("want", "chart", "turns"):
+        if asked[name] is not None:
+            raise ValueError(f"{name}: is of {'open' if closed else 'closed'} strips; a strip with a distance is open")
+    if closed == (natural_radius is None):
+        raise ValueError("natural_radius: a closed strip needs it (inf if it is straight), one with a distance has none")
     for name in ("yield_strain", "want"):
         if asked[name] is not None and not 0 < asked[name] < math.inf:
             raise ValueError(f"{name}: {asked[name]:g} must be positive and finite")
@@ -80,7 +88,11 @@ def _answer(strip: Strip, asked: dict) -> None:
 
     turns, quiet = asked["turns"] or 3, asked["quiet"]
     with threadpool_limits(1, "blas"):  # the matrices are small
-        if asked["want"] is None and asked["chart"] is None:
+        if asked["distance"] is not None:
+            from branches.strip.arch import answer
+
+            write_output(answer(strip, asked["distance"], asked["ends"], asked["push_at"], asked["yield_strain"]))
+        elif asked["want"] is None and asked["chart"] is None:
             write_output(report.answer(strip, asked["yield_strain"], quiet))
         if asked["want"] is not None:
             write_output(report.dimensions(strip, turns, asked["want"], quiet))

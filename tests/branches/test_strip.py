@@ -17,6 +17,7 @@ from branches.scene.units import quantity
 from branches.strip import report as strip_report
 from branches.strip import states as strip_states
 from branches.strip.__main__ import main, parser
+from branches.strip.arch import push
 from branches.strip.report import assumptions, barrier, barriers_at, chart, deviations, dimensions
 from branches.strip.states import buckled, circles, ways_out
 from ribbon_model.exact_finite_width import curve
@@ -232,6 +233,34 @@ def test_cautions():
     assert "0.17 on the single loop and more" in slender
     slim = Strip(0.003, 0.0001, 3.0, 0.5, 0.3, 1e9)
     assert not list(assumptions(slim, circles(slim), 0.02))
+
+
+def test_the_snap_load_of_a_shallow_arch_between_hinges(excess=4e-4):
+    """At P = (2 pi/l)^2 EI the second mode buckles, with the deflection F/(2 P k) (sin k x + k x), excess 3 l (F/2P)^2/4.
+
+    The initial one is a sine of height 2 l sqrt(e)/pi. Terms of order e are left out; nu = 0: the bending of the section, too.
+    """
+    strip = replace(BLADE, length=0.4, width=0.01, thickness=0.0005, poisson_ratio=0.0, natural_radius=math.inf)
+    way, bending = push(strip, 0.4 * (1 - excess), "hinged"), strip.youngs_modulus * 0.0005**3 * 0.01 / 12
+    top = np.argmax(way.force)
+    load, travel = 16 * math.pi**2 * bending / 0.4**2 * math.sqrt(excess / 3), 0.4 * math.sqrt(excess) * (2 / math.pi - 3**-0.5)
+    assert way.force[top] == pytest.approx(load, rel=3 * excess) and way.travel[top] == pytest.approx(travel, rel=20 * excess)
+    height = 0.4 * math.sqrt(excess) * 2 / math.pi
+    assert way.end == "the strip leaves it" and way.travel[-1] == pytest.approx(height, rel=3e-2)  # half-way through
+
+
+def test_options_of_closed_strips_are_not_of_open_ones(call):
+    given = ["--width", "1cm", "--thickness", ".5mm", "--length", ".4", "--poisson-ratio", ".3", "--youngs-modulus", "200GPa"]
+    for more, said in (
+        ([], "natural_radius: a closed strip needs it"),
+        (["--distance", ".39", "--natural-radius", "1"], "one with a distance has none"),
+        (["--ends", "hinged", "--natural-radius", "1"], "ends: is of open strips"),
+        (["--distance", ".39", "--turns", "3"], "turns: is of closed strips"),
+        (["--distance", ".5"], "distance: 0.5 m must be from 0.24 m to below the length, 0.4 m"),
+        (["--distance", ".39", "--push-at", "1.5"], "roller.at: must be below 1, not 1.5"),
+    ):
+        done = call(main, *given, *more)
+        assert done.returncode == 2 and said in done.err and done.err.count("\n") == 1
 
 
 def test_which_law_holds():
