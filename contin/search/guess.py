@@ -68,7 +68,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
     """Return the multipliers after damped Gauss-Newton steps, all but the rates of the states weighted by ``share``."""
     lam, multipliers = start
     residual, gradient, normal = _equations(system, states, lam, multipliers, share)
-    if not np.isfinite(residual).all():
+    if not (np.isfinite(residual).all() and np.isfinite(normal).all()):
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
     for _ in range(MOST_UPDATES):
         if not np.any(normal):
