@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.draw.style import in_words
-from branches.paper.page import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, Row, Section, keep
+from branches.paper.page import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, Row, Section, keep, new_figure
 from ribbon_model import exact
 from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
@@ -129,9 +129,7 @@ def fig10(folder: Path) -> Section:
 
 
 def _draw_fig9(folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 6), layout="constrained")
+    figure = new_figure(12, 6)
     grid = figure.add_gridspec(2, 4, width_ratios=(1, 1, 1, 3), height_ratios=(1, 0.09))
     first = None
     for column, ratio in enumerate((0.0, 1.0, 2.0)):
@@ -248,10 +246,8 @@ def _bars(axes, cases, window, energy=False):
 
 
 def _draw_fig10(folder: Path) -> str:
-    from matplotlib.figure import Figure
-
     window, top = (-4.0, 7.0), 2.3
-    figure = Figure(figsize=(14, 8), layout="constrained")
+    figure = new_figure(14, 8)
     panels = figure.subplots(2, 3, sharex=True, height_ratios=(1.6, 1))
     for column, (law, letter) in enumerate(((RIBBON, "a"), (FLAT_ROD, "b"), (ISOTROPIC_ROD, "c"))):
         region, bars = panels[0, column], panels[1, column]

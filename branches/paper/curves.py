@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from branches.draw.style import CONJUGATE, NATURAL, colour_of
 from branches.graph.picture import conjugate, legend
 from branches.graph.stored import read
-from branches.paper.page import STABLE, Row, Section, keep
+from branches.paper.page import STABLE, Row, Section, keep, new_figure
 from branches.run.display import Display
 from branches.run.many import run_many
 from branches.scene.index import LABEL, SymmetryWatch
@@ -123,9 +123,7 @@ def _difference(m, n, line) -> float:
 
 
 def _draw(lines, secondary, last, folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    figure = new_figure(11, 4.5)
     panels = figure.subplots(1, 2)
     for (m, n), line in lines.items():
         colour = colour_of(n)
@@ -224,9 +222,7 @@ def fold_over_width() -> tuple[np.ndarray, tuple[float, float]]:
 
 
 def _draw_curves(fold, birth, folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.5, 5.5), layout="constrained")
+    figure = new_figure(9.5, 5.5)
     axes = figure.subplots()
     Gammas = np.geomspace(0.05, 1000, 400)
     for m, n in MODES:
@@ -260,9 +256,7 @@ def _fine(points: np.ndarray) -> np.ndarray:
 
 
 def _draw_diagrams(graph, folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15, 6), layout="constrained")
+    figure = new_figure(15, 6)
     panels = figure.subplots(1, len(GAMMAS) + 1, sharex=True, sharey=True)
     names = [*(f"{FINITE_WIDTH.name}, Gamma = {Gamma:.12g}" for Gamma in GAMMAS), RIBBON.name]
     for axes, name, Gamma in zip(panels, names, (*GAMMAS, None)):

@@ -16,7 +16,7 @@ from branches.graph import closed as diagram
 from branches.graph.closed import preview
 from branches.graph.picture import figure as draw_diagram
 from branches.graph.stored import read
-from branches.paper.page import BUCKLED, STABLE, Row, Section, keep
+from branches.paper.page import BUCKLED, STABLE, Row, Section, keep, new_figure
 from branches.run.display import Display
 from branches.run.many import run_many
 from branches.run.runner import whole_branch
@@ -197,10 +197,9 @@ def _stable_pieces(graph, law) -> dict[tuple[int, int], list[tuple[float, float]
 
 def _draw(found, folder: Path) -> str:
     """A bar for each circle, hatched pieces for buckled states above it."""
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(11, 6), layout="constrained")
+    figure = new_figure(11, 6)
     panels = figure.subplots(len(LAWS), 1, sharex=True)
     for axes, law in zip(panels, LAWS):
         for row, m in enumerate(COVERINGS):

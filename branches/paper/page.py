@@ -152,6 +152,13 @@ def page(sections: list[Section]) -> str:
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
 
 
+def new_figure(wide: float, high: float):
+    """Return an empty figure of no display, its size in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(wide, high), layout="constrained")
+
+
 def keep(figure, folder: Path, name: str) -> str:
     """Write a figure of no display as name.png and name.svg; the name. Raises `branches.store.files.StoreError`."""
     for suffix in (".png", ".svg"):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.page import STABLE, UNSTABLE, Row, Section, keep
+from branches.paper.page import STABLE, UNSTABLE, Row, Section, keep, new_figure
 from branches.paper.shell_run import DEFAULT, Outcome, ShellError, compute, describe, read
 from branches.store.command import write_output
 from contin.lowlevel import Colour
@@ -136,9 +136,7 @@ def _means(outcomes: list[Outcome]) -> list[str]:
 
 
 def _draw(outcomes: list[Outcome], folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.5, 5.4), layout="constrained")
+    figure = new_figure(12.5, 5.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1))
     _draw_laws(left)
     _draw_roots(left, outcomes)

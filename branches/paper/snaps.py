@@ -9,7 +9,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from branches.paper.page import Row, Section, keep
+from branches.paper.page import Row, Section, keep, new_figure
 from ribbon_model.descent import KICK, METRICS, PAST, SEGMENTS, Rest, let_go, past
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.linear import energy_interval
@@ -140,14 +140,12 @@ def _named(start: Start, rest: Rest) -> str:
 
 def _draw(films, folder: Path, frames: int = 6) -> str:
     """The strips on their way, at equal distances in the strains; the experiments' single loop first."""
-    from matplotlib.figure import Figure
-
     from branches.draw.solid import widest
     from branches.draw.strip import ROOM, draw_strip, reach_of
     from branches.draw.style import in_words
 
     films = sorted(films, key=lambda film: film[0].m)
-    figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
+    figure = new_figure(2 * frames, 2.3 * len(films))
     for line, (start, descent) in zip(figure.subfigures(len(films), 1, squeeze=False)[:, 0], films):
         line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {in_words(f'{start.kappa_n:.3f}')}", fontsize=12)
         shown = descent.frames(frames)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.page import STABLE, UNSTABLE_FILL, Row, Section, keep
+from branches.paper.page import STABLE, UNSTABLE_FILL, Row, Section, keep, new_figure
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import HINGED, factors, first_root
 
@@ -53,9 +53,7 @@ def sign(law, nu, xi):
 
 
 def _draw(folder: Path) -> str:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(14, 5), layout="constrained")
+    figure = new_figure(14, 5)
     panels = figure.subplots(1, 4)
     for axes, law, letter in ((panels[0], RIBBON, "a"), (panels[2], FLAT_ROD, "b"), (panels[3], ISOTROPIC_ROD, "c")):
         nu, xi = np.meshgrid(np.linspace(0.001, 0.5, 300), np.linspace(0.0025, TOP, 1000))
