@@ -186,11 +186,12 @@ def _share(intervals: int, segments: int) -> Share:
 
 
 def run(kernel: Callable[..., Any], given: Sequence[Any], whole: Share, stages: Sequence[bool]) -> list[Any]:
-    """Return the results of ``kernel(*given, share)``: one call for a matrix that is one segment, or else stage by stage.
+    """Return the results of ``kernel(*given, share)``: one call for a matrix of few segments, or else stage by stage.
 
     ``stages`` says for each stage whether segments are independent in it; then they are calls of their own, in several threads.
+    Two segments, which connections have, are one call.
     """
-    if whole.last == 1 or threads.count() == 1:
+    if whole.last <= 2 or threads.count() == 1:
         return [kernel(*given, whole)]
     results: list[Any] = []
     for stage, independent in enumerate(stages):
