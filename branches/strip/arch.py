@@ -45,7 +45,7 @@ def push(strip: Strip, distance: float, ends: str = "clamped", at: float = 0.5) 
     follow = {"follow": "roller", "to": -distance / 2, "limits": {"roller": [-strip.length / 2, strip.length / 2]}}
     scene = parse(json.dumps({
         "material": {}, "dimensions": sizes, "start": ends, "finish": ends, "begin": "arch", "roller": {"at": at},
-        "numbers": {"distance": distance}, "stages": [follow, follow | {"start_at": "BP 1"}],
+        "steps": {"angle": 0.1}, "numbers": {"distance": distance}, "stages": [follow, follow | {"start_at": "BP 1"}],
     }), "strip")  # fmt: skip
     pieces, end, pushes = [[]], "the way ends", False
     stage = OpenStage(scene, 1)
@@ -76,7 +76,7 @@ def answer(strip: Strip, distance: float, ends: str | None, at: float | None, yi
     beyond = yield_strain is not None and way.strain.max() > yield_strain
     lines = [
         f"arch between {ends} ends {1e3 * distance:.4g} mm apart, pushed at {at:g} of its length; strain {way.strain[0]:.3%}",
-        f"snap load     {way.force[top]:.4g} N after {1e3 * way.travel[top]:.4g} mm of travel: more weight snaps it through",
+        f"snap load     {way.force[top]:.4g} N after {1e3 * way.travel[top]:.3g} mm of travel: more weight snaps it through",
         f"screw         {1e3 * way.travel[-1]:.4g} mm of travel until {way.end}; it is stable at each place before",
         f"strain        {way.strain.max():.3%} at most on this way, {way.strain[top]:.3%} under the snap load",
         *([f"caution: strains beyond the yield strain {yield_strain:g}"] if beyond else []),
