@@ -12,6 +12,7 @@ import sys
 COMMANDS = {
     "run": ("branches.run.__main__", "follow a branch, or all branches of a diagram, to result files"),
     "secondary": ("branches.secondary", "follow the branches that leave at secondary bifurcations"),
+    "curve": ("branches.curve", "follow a fold against a second number: nu, Gamma, a load, one of a law of your own"),
     "plot": ("branches.plot", "draw a result: a branch with its strips, a diagram, any column against any other"),
     "graph": ("branches.graph.__main__", "list branches, states and folds of a bifurcation diagram"),
     "explore": ("branches.explore.__main__", "write results as one page for a browser"),

@@ -1,0 +1,102 @@
+"""``python -m branches.curve RESULT --against NAME``: the folds of a result against a second number of its scene."""
+
+from __future__ import annotations
+
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin("no curve was written")
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from branches.draw.style import smooth
+from branches.export.__main__ import labelled_point
+from branches.scene.fields import ConfigError
+from branches.store.branch import StoredBranch
+from branches.store.command import Parser, complain, write_output
+from branches.store.files import StoreError, check_picture, prepare, write_bytes, write_picture
+from branches.store.read import read_branch
+from contin import Branch, ContinError, curve
+from contin.lowlevel import Label, one_of, point_of
+
+
+def parser() -> Parser:
+    """Return the command line."""
+    parser = Parser("curve", "Follow a fold in two numbers: that of the branch, and another one, such as nu, Gamma or a load.")
+    parser.add_argument("result", metavar="RESULT", help="a branch file")
+    parser.add_argument("--against", metavar="NAME", required=True, help="the second number")
+    parser.add_argument("--between", nargs=2, type=float, metavar=("LOW", "HIGH"), required=True, help="ends of the curve")
+    parser.add_argument("--point", default="LP", help="the fold: its number among labelled points (default: the only one)")
+    parser.add_argument("-o", "--out", metavar="FILE", help="table (.csv) or picture (.pdf, .png, .svg) to write")
+    return parser
+
+
+def follow(branch: StoredBranch, point: int, second: str, between) -> tuple[Branch, str]:
+    """Return the curve of folds through a kept point in the units of contin, and the number that the branch follows.
+
+    Raises
+    ------
+    ConfigError, ContinError
+        The point is no fold, or the second number is none; or the curve cannot be followed from there.
+    """
+    system, x = branch.discretized(point)
+    first, factor = system.free[0], branch.scene.factor(second)
+    if branch.points["label"][point].decode() != Label.FOLD:
+        raise ConfigError("--point: must be a fold (LP); its number is in the column LAB of the run")
+    numbers = getattr(branch.scene, "law_parameters", system.problem.parameters)  # not the length of a closed strip, which is 1
+    known = [name for name in branch.columns.shown() if name in numbers and name not in system.free]
+    if second not in known:
+        raise ConfigError(f"--against: {one_of(second, known)}")
+    low, high = sorted(end / factor for end in between)
+    here = system.parameter(x, second)
+    if not low <= here <= high or low == high:
+        raise ConfigError(f"--between: must hold the value of the result, {second} = {here * factor:g}")
+    start = dataclasses.replace(point_of(system, x), label=Label.FOLD, column=first)
+    return curve(start, second, direction="both", limits={second: (low, high)}), first
+
+
+def main(argv=None) -> int:
+    """Follow; return the exit code."""
+    options = parser().parse_args(argv)
+    try:
+        out = Path(options.out) if options.out else None
+        if out and out.suffix != ".csv":
+            check_picture(out)
+        branch = read_branch(options.result)
+        found, first = follow(branch, labelled_point(branch, options.point), options.against, options.between)
+        names = options.against, first
+        values = [np.array([point[name] for point in found]) * branch.scene.factor(name) for name in names]
+        titles = [branch.titled(name) for name in names]
+        rows = [f"{x:.10g},{y:.10g},{point.label}\n" for x, y, point in zip(*values, found)]
+        table = "".join([",".join([*titles, "label"]) + "\n", *rows])
+        if out and out.suffix == ".csv":
+            prepare(out)
+            write_bytes(out, table.encode())
+        elif out:
+            write_picture(_figure(branch, names, values, found), out)
+    except (ConfigError, StoreError, ContinError) as error:
+        complain(f"error: {error}")
+        return 2
+    ends = values[0].min(), values[0].max()
+    why = "" if np.allclose(ends, sorted(options.between)) else f" ({found.stop})"
+    told = f"{len(found)} folds, {titles[0]} from {ends[0]:.6g} to {ends[1]:.6g}{why}\nwritten to {out}\n"
+    write_output(told if out else table)
+    return 0
+
+
+def _figure(branch: StoredBranch, names, values, found: Branch):
+    from matplotlib.figure import Figure
+
+    axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
+    axes.plot(*smooth(s := [point.arclength for point in found], s, *values)[1:], color="black")
+    axes.set(**{f"{axis}label": branch.axis(name)[1] for axis, name in zip("xy", names)})
+    axes.set_title(f"folds of {branch.about.partition(', nu')[0]}")
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.run(main))
