@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from branches.scene.columns import OWN
+from branches.scene.copies import copied
 from branches.scene.fields import ConfigError, StepConfig, Strict
 from branches.scene.open_strip import (
     Along,
@@ -69,6 +70,7 @@ class StripConfig(Strict):
     along: Axis | None = Field(None, description="direction in which it begins")
     normal: Axis | None = Field(None, description="direction of its normal where it begins, as near as it can be")
     length: float | None = Field(None, gt=0, description="its length, without an end")
+    copies: None = Field(None, description="so many, by turns about an axis: 6 about z (see `branches.scene.copies`)")
     bend: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing bends about its width, in radians")
     twist: float = Field(0.0, ge=-1000, le=1000, description="angle by which the drawing is twisted")
 
@@ -186,6 +188,11 @@ class NetworkScene(StagedScene):
     mesh: OpenMesh = OpenMesh(degree=6)
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1)
+
+    @classmethod
+    def prepared(cls, values: dict) -> dict:
+        """Write out copies of strips."""
+        return copied(values)
 
     @model_validator(mode="after")
     def _fits(self):

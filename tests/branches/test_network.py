@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.optimize import brentq
 from test_explore import decoded
 
@@ -19,6 +20,7 @@ from branches.run.barriers import falls, places, report, told
 from branches.run.display import Display
 from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
+from branches.scene.network import NetworkScene
 from branches.scene.open_stage import OpenStage
 from branches.scene.parse import dump, load, parse
 from contin import ContinError, trace
@@ -376,6 +378,7 @@ MISTAKES = {
     "held: {AA: clamped}": "held: 'AA' (did you mean 'A'?) must be one of A, cut, tip",
     "held: {A: {rotaton: clamped}}": "unknown field 'held.A.rotaton' (did you mean 'rotation'?); the fields are rotation,",
     "loads: {P: {tipp: [0, 0, 1]}}": "loads: P: 'tipp' (did you mean 'tip'?) must be a joint, or a strip",
+    "strips: {a: {begin: [0, 0, 0], end: [0, 0, 1], normal: x, copies: 1 about z}}": "a: copies: '1 about z' must be a number",
     "held: {A: welded}": "held.A: 'welded' must be clamped, hinged, ball joint, free",
     "loads: {P: {tip: {moment: 1.0}}}": "loads: P: moments: tip must be held by a hinge",
     "loads: {P: {tip: {force: [0, 0, 1], moment: 1.0}}}": "loads.P.tip: force, moment: give one of them",
@@ -410,6 +413,33 @@ def test_a_mistake_is_one_sentence(change):
         parse(text, "scene.yaml")
     assert MISTAKES[change] in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_copies_about_an_axis_are_the_strips_written_out(root):
+    """The hexagon of configs, whose strips and joints are written one by one, with what turns with them."""
+    whole = load(root / "configs" / "network_hexagon.yaml")
+    text = (
+        "material: {law: rod, B1: 1.0, B2: 1.2, C: 0.8, kappa_n: 0.0}\n"
+        "strips: {s: {begin: [0, 1, 0], end: [0, 0.5, 0.866025403784], normal: y, copies: 6 about x}}\n"
+        "joints: {J: {strips: [s finish, next s start], hinge: [0, 1, 0], arm: {s finish: [0, 1, 0]}}}\n"
+        "held: {J: {rotation: free, slides_along: [0, 1, 0]}}\nloads: {P: {J: [0, 0, 2], s at 0.5: {force: [0, 1, 0]}}}\n"
+        "numbers: {P: 1}\nstages: [{follow: P, to: 3, limits: {P: [0, 4]}, label: {P: [1, 2, 3]}, held: {J: free}}]\n"
+    )
+    values = NetworkScene.prepared(yaml.safe_load(text))
+    for number, (own, other) in enumerate(zip(values["strips"].values(), whole.strips.values()), 1):
+        np.testing.assert_allclose([own["begin"], own["end"]], [other.begin, other.end], atol=1e-11)
+        across = np.array([0, math.cos((number - 1) * math.pi / 3), math.sin((number - 1) * math.pi / 3)])
+        np.testing.assert_allclose(own["normal"], across, atol=1e-11)
+        joint, end = values["joints"][f"J_{number}"], f"s_{number} finish"
+        assert joint["strips"] == [place.replace("s", "s_", 1) for place in whole.joints[f"J{number}"].strips]
+        assert joint["arm"] == {end: [0, 1, 0]}
+        held, loads = values["held"][f"J_{number}"], values["loads"]["P"]
+        for vector in (joint["hinge"], held["slides_along"], loads[f"s_{number} at 0.5"]["force"]):
+            np.testing.assert_allclose(vector, across, atol=1e-12)
+    stage = values["stages"][0]
+    assert stage["held"] == {f"J_{number}": "free" for number in range(1, 7)} and stage["label"] == {"P": [1, 2, 3]}
+    hub = "strips: {s: {begin: [0, 1, 0], end: [0, 0, 0], normal: x, copies: 3 about x}}\njoints: {hub: [every s finish]}\n"
+    assert NetworkScene.prepared(yaml.safe_load(hub))["joints"] == {"hub": [f"s_{k} finish" for k in (1, 2, 3)]}
 
 
 def test_places_and_reactions_are_labelled_and_limited(run):
