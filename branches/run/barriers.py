@@ -8,6 +8,7 @@ lower. A fold at which a stable piece ends is passed by a hundredth, and the str
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,7 +23,7 @@ from contin import ContinError, Point
 from contin.lowlevel import exact_text, levels
 from ribbon_model.barriers import KICK_OPEN, SEGMENTS, Barrier, apart, at_rest, barriers, ways_down
 from ribbon_model.changed_supports import corrected
-from ribbon_model.descent import LONGEST, descend, past
+from ribbon_model.descent import LONGEST, PAST, descend
 from ribbon_model.equilibrium import CENTRELINE
 from ribbon_model.network_segments import NetworkChain, cut, unsupported
 
@@ -200,7 +201,8 @@ def _fall(branch: OpenBranch, row: int) -> Fall | None:
         return None
     column, length = stage.follow, branch.scene.longest
     limit, before = (float(branch.points[column][at]) for at in (row, row - 1))
-    value = past(limit, 1 if before < limit else -1)
+    size = max(abs(limit), float(np.abs(branch.points[column]).max()) / 10)  # no unit counts
+    value = limit + math.copysign(PAST * size, limit - before)
     try:
         chain = cut(stage.strip, *branch.discretized(row), SEGMENTS)
         chain = replace(chain, numbers={**chain.numbers, column: value}).moved(np.zeros(chain.size))

@@ -25,7 +25,7 @@ def test_barriers_are_differences_of_the_potential(twisted):
     for event in twisted.events[twisted.events["label"] == b"UZ"]:
         located.setdefault((round(float(event["turn"]), 6), int(event["index"])), []).append(float(event["potential"]))
     both, one = places(twisted)
-    assert (both.column, both.value, one.value) == ("turn", pytest.approx(5.5), pytest.approx(3.0))
+    assert [twisted.points["turn"][place.row] for place in (both, one)] == pytest.approx([5.5, 3.0])
     (saddle,) = located[5.5, 1]
     heights = sorted(way.height for way in both.ways.values())
     assert heights == pytest.approx(sorted(saddle - energy for energy in located[5.5, 0]), rel=1e-8)
