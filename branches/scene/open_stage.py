@@ -314,9 +314,8 @@ class OpenStage(Stage):
         what = event["name"].decode()
         change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
         broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
-        told = (
-            what if "=" not in what and (not singular or "kernel" in what or label == Label.CORNER) else ""
-        )  # not the value once more
+        tells = not singular or "kernel" in what or label == Label.CORNER
+        told = what if "=" not in what and tells else ""  # not the value once more
         kind = f" ({told})" if told else ""
         return f"stage {self.number}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
 

@@ -340,7 +340,7 @@ class EndConditions:
         fixed: tuple[list[int], list[int]] = ([], [])
         free: dict[int, Number] = {}
         for number in v.pushes:
-            if number >= len(self.conditions):
+            if not 0 <= number < len(self.conditions):
                 raise ProblemError(f"pushes: {number} is not the number of an end condition, 0 to {len(self.conditions) - 1}")
         for number, condition in enumerate(self.conditions):
             place = None if number in v.pushes else self._fixes(number)

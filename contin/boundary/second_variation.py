@@ -170,7 +170,6 @@ def lies_flat(number: int, name: str) -> Event:
         largest = np.abs(field.values(system.gauss_times, inside, inside[:0], p)[:, :n]).max(axis=0)
 
         def at(s: float, end: int, along: Array) -> tuple[Array, Array]:
-            """Return rates of the states, and derivatives of the gap by x, a way further along the strip."""
             there = ends + s * along
             jacobian = batch.jacobian(np.zeros(1), there[:1], there[1:], p, batch.columns([]))[1][0]
             rates = field.values(system.mesh[[-end]] + s, there[[end]], there[:0], p)[0, : ends.shape[1]]

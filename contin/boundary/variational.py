@@ -33,7 +33,7 @@ from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
 from contin.levels import LOCATED
 from contin.problems.rewriting import of_parameters
-from contin.problems.statement import MOST_CONDITIONS, check_statement, portable
+from contin.problems.statement import check_statement, portable
 from contin.text import shown
 
 
@@ -88,11 +88,10 @@ class VariationalProblem(BoundaryValueProblem):
     end_work : callable, optional
         ``end_work(x0, x1, y0, y1, p)``: the same at the ends.
     pushes : sequence of int, or mapping of int to str, optional
-        Contacts: numbers, from 0, of those ``ends`` that are gaps e >= 0, and names for them. Each has a multiplier ``sigma``,
-        and the force -sigma >= 0, which pushes; one of both is zero. Special points BC say which contact touches or lifts off;
-        the index counts what is free to move with the contacts that hold there (`contacts`). Where a strip touches along its
-        direction, as the middle of a column touches a wall, a run ends where it lies flat at the wall: lines of contact are not
-        followed.
+        Contacts: numbers, from 0, of those ``ends`` that are gaps e >= 0, and names for them. Each has a multiplier ``sigma``
+        and the force -sigma >= 0, and one of gap and force is zero. Points BC say which contact touches or lifts off; the index
+        counts what is free to move with those that hold. Where a strip touches along its direction, as the middle of a column
+        touches a wall, a run ends where it lies flat at the wall: lines of contact are not followed.
     points : sequence of int, optional
         Those contacts that are points, as rollers are, which a strip may bend around.
 
@@ -293,8 +292,6 @@ class VariationalProblem(BoundaryValueProblem):
 def _contacts(given: Sequence[int] | Mapping[int, str], points: Sequence[int]) -> dict[int, str]:
     """Return the numbers of contacts, some of them ``points``, and their names; "" without one."""
     names = dict(given) if isinstance(given, Mapping) else dict.fromkeys(given, "")
-    for number in names:
-        checks.whole("pushes", number, 0, MOST_CONDITIONS)
     for number in points:
         if number not in names:
             raise ProblemError(

@@ -15,9 +15,9 @@ from contin.core.settings import Settings
 from contin.core.step import Reason, State, Stop, corrected
 from contin.core.system import Scales
 from contin.core.trial import Event, Trial
-from contin.draws import generator
 from contin.errors import ConvergenceError
-from contin.levels import BESIDE, MOST_STEPS, ROUGH
+from contin.events.corner import changed_between
+from contin.levels import MOST_STEPS, ROUGH
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -36,12 +36,6 @@ _FAR = 1 / np.finfo(float).eps
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
-#: Part that the bend of a corner has of the usual change of the residual on a way along the tangent: for a smooth function, it
-#: is about as large as the way.
-_JUMP = 0.1
-#: On a tenth of the way the bend of a corner is a tenth, more than this part, and that of a smooth curve a hundredth, however
-#: small its radius.
-_LIKE = 0.05
 
 
 def met(ends: Sequence[Event], here: Trial, first: Trial) -> Stop | None:
@@ -61,31 +55,14 @@ def no_convergence(state: State, settings: Settings, error: ConvergenceError) ->
             "look for what they divide by, or take a root or logarithm of: their domain ends there",
         )  # fmt: skip
     known = advice(state, settings)
-    if not known and _meets_corner(state):
+    if corner := changed_between(*(Trial.without_tangent(state.system, predict(state, way)) for way in (0.0, ROUGH))):
         return Stop(
-            Reason.NO_CONVERGENCE, f"the derivatives of the equations jump a step of min_step = {least} further on",
-            "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
+            Reason.NO_CONVERGENCE, f"the curve meets a corner: {corner[0]} changes",
+            "curves in two parameters end there: start another one from a special point on the other side",
         )  # fmt: skip
     return Stop(
         Reason.NO_CONVERGENCE, f"the step became smaller than min_step = {least} ({error})", known or _as_it_is(state, settings)
     )
-
-
-def _meets_corner(state: State) -> bool:
-    """Return whether the residual bends within a short way along the tangent as only a corner does."""
-    bend, usual = _bend(state, BESIDE)
-    return bool(bend > _JUMP * usual and _bend(state, BESIDE / 10)[0] > _LIKE * bend)
-
-
-def _bend(state: State, length: float) -> tuple[float, float]:
-    """Return by how much the residual bends on a short way along the tangent, and its usual change on such a way."""
-    system, x, way = state.system, state.x, length * state.tangent
-    here = system.residual(x)
-    forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
-    across = generator("failure").standard_normal(system.size)
-    across *= length / np.sqrt(inner(system, across, across))
-    usual = system.residual(x + across) - here
-    return float(np.max(np.abs(forth + back), initial=0.0)), float(np.max(np.abs(usual), initial=0.0))
 
 
 def advice(state: State, settings: Settings) -> str:

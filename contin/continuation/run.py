@@ -32,7 +32,7 @@ from contin.core.step import Reason, State, Stop
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint, with_details
-from contin.events.corner import Way, conditions, corner_at, on_mesh_of, refrozen
+from contin.events.corner import Way, changed_between, conditions, corner_at, hit_of, on_mesh_of, refrozen
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.events.watch import Watch
@@ -233,6 +233,8 @@ class Continuation:
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
+        corner = next((point.at for point in found if point.test in self._conditions), np.inf)  # it tells of branches, too
+        found = [point for point in found if point.label != Label.BRANCH_POINT or abs(point.at - corner) > APART * arc.step]
         changes = index_changes(self._watch.index, arc, found, self._notes)
         if end == len(special):
             self._notes.doubts(self._watch.index, arc, found, step.doubt if len(found) == len(special) else "")
@@ -250,6 +252,8 @@ class Continuation:
         self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
         if any(step.end.value(test) >= 0 for test in self._conditions):  # the equations are the same beyond
             self.state = dataclasses.replace(self.state, system=refrozen(step.end))
+        for name in changed_between(arc.before, arc.trial):
+            self._notes.inside(f"the curve passes a corner: {name} changes", arc)
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[0])
@@ -262,13 +266,15 @@ class Continuation:
         assert point.test is not None
         state, settings, came = arc.state, self.settings, point.trial.tangent
         came = came if np.isfinite(came).all() else state.tangent
-        corner, ways = corner_at(point, came, self._conditions.index(point.test), self.primary)
+        hit = hit_of(point.test, point.trial)
+        corner, ways = corner_at(point, came, hit, self.primary)
+        shown = settings.corners or hit not in state.system.knots
+        corner = corner if corner and (shown or corner.details.kind != "goes on") else None
         if corner is not None:
             self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=corner.name)
             yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
         if ways:
-            at, accepted = corner or point, state.accepted + 1
-            hit = self._conditions.index(point.test)
+            at, accepted = corner or point, state.accepted + (corner is not None)
             behind = on_branch(*on_mesh_of(state.system, ways[0], at.trial.x, hit), settings, False)
             length, step = state.arclength + at.at, min(state.step, settings.step) if corner else state.step
             self.go_on((dataclasses.replace(behind, arclength=length, step=step, accepted=accepted), None))
@@ -283,9 +289,9 @@ class Continuation:
         """Return the index before and behind a corner: what contacts hold does not move."""
         if self._watch.index is None or not ways:
             return None
-        both = (corner.trial, Trial.without_tangent(ways[0].system, corner.trial.x))
-        before, behind = (None if np.isnan(value := trial.value(self._watch.index)) else int(value) for trial in both)
-        return before, behind
+        both = corner.trial, Trial.without_tangent(ways[0].system, corner.trial.x)
+        before, behind = (trial.value(self._watch.index) for trial in both)
+        return None if np.isnan(before + behind) else (int(before), int(behind))
 
     def _takes_shorter_steps(self) -> bool:
         """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""

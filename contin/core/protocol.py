@@ -235,6 +235,7 @@ class Discretization(Equations, Protocol):
     #: Number of conditions that unknowns decide (`contin.events.corner`), and their frozen outcomes, 1 or -1 each.
     conditions: int = 0
     sides: Array = np.empty(0)
+    knots: Sequence[int] = ()
 
     @property
     def thawed(self) -> Any:

@@ -49,6 +49,8 @@ class Settings:
         warn and will go.
     folds, branch_points : bool
         Look for folds, for branch points.
+    corners : bool
+        Label corners at the knots of tables, too (BC): hundreds may be passed in silence. A fold there is always labelled.
     errors : bool
         Solve labelled points again on the mesh halved, until that changes them by less than the mesh tolerance: the last change
         is their error estimate.
@@ -87,6 +89,7 @@ class Settings:
     monitors: Sequence[Event] = ()
     folds: bool = True
     branch_points: bool = True
+    corners: bool = False
     errors: bool = True
     angle: Angle | None = None
     change: Angle = 0.4
@@ -158,6 +161,7 @@ class Options(TypedDict, total=False):
     monitors: Sequence[Event]
     folds: bool
     branch_points: bool
+    corners: bool
     errors: bool
     angle: Angle | None
     change: Angle

@@ -459,29 +459,38 @@ class Composed(System):
 
     # --- conditions that unknowns decide ---------------------------------------------------------------------------
 
-    def _origins(self, name: str) -> tuple[int, ...]:
-        """Return the conditions of one of the functions; along t, those on parameters alone."""
-        return self.problem.batch(name).conditions(self._free, name == "field")
-
     @functools.cached_property
+    def _decided(self) -> list[tuple[str, int]]:
+        """Functions, and places of conditions on their tapes; along t, those on parameters alone."""
+        batches = ((name, self.problem.batch(name)) for name in self._functions)
+        return [(name, at) for name, batch in batches for at in batch.conditions(self._free, name == "field")]
+
+    @property
     def conditions(self) -> int:  # type: ignore[override]
         """Their number."""
-        return sum(len(self._origins(name)) for name in self._functions)
+        return len(self._decided)
+
+    @property
+    def knots(self) -> list[int]:  # type: ignore[override]
+        """Those that are knots of tables."""
+        kept: list[Any] = [self.problem.batch(name).recorded for name, _ in self._decided]
+        return [k for k, (_, at) in enumerate(self._decided) if kept[k].recording.tape.operations[at].name == "table"]
 
     def written(self, k: int, side: float) -> str:
         """Return what the user has written for a condition or, where that is not known, the number that decides it.
 
         Of a contact, whether it touches or lifts off at this side.
         """
-        name, at = [(name, at) for name in self._functions for at in range(len(self._origins(name)))][k]
-        batch, origins, states = self.problem.batch(name), self._origins(name), self.problem.states
-        if contact := getattr(self.problem, "contacts", {}).get(origins[at]) if batch.signature.ends else None:
+        name, at = self._decided[k]
+        batch, states = self.problem.batch(name), self.problem.states
+        own = [number for number, (other, _) in enumerate(self._decided) if other == name]
+        if contact := getattr(self.problem, "contacts", {}).get(at) if batch.signature.ends else None:
             return f"{contact} {'touches' if side > 0 else 'lifts off'}"
-        if known := source(batch, origins[at]):
+        if known := source(batch, at):
             return known
         labels = [f"{end}.{state}" for end in "ab" for state in states] if batch.signature.ends else states
-        numbers = batch.frozen(self._free, np.ones(len(origins)), name == "field")[1]
-        return numbers.text([*labels, *self.problem.parameters])[at - len(origins)]
+        numbers = batch.frozen(self._free, np.ones(len(own)), name == "field")[1]
+        return numbers.text([*labels, *self.problem.parameters])[own.index(k) - len(own)]
 
     def with_sides(self, sides: Array) -> Self:
         """Return the same with frozen outcomes; with none, the equations as they are."""
@@ -500,10 +509,8 @@ class Composed(System):
 
     def _frozen(self, name: str, batch: Batch, which: int = 0) -> Any:
         """Return one of the functions with these outcomes or, with 1, the numbers that decide."""
-        if not self.sides.size or not (count := len(self._origins(name))):
-            return batch
-        first = sum(len(self._origins(other)) for other in self._functions[: self._functions.index(name)])
-        return batch.frozen(self._free, self.sides[first : first + count], name == "field")[which]
+        sides = self.sides[[other == name for other, _ in self._decided]] if self.sides.size else self.sides
+        return batch.frozen(self._free, sides, name == "field")[which] if sides.size else batch
 
     @functools.cached_property
     def unscaled(self) -> Batch:
@@ -514,8 +521,8 @@ class Composed(System):
     @functools.cached_property
     def _deciding(self) -> list[tuple[int, Any]]:
         """The numbers that decide: places of functions, and theirs."""
-        names = [(at, name) for at, name in enumerate(self._functions) if self._origins(name)]
-        return [(at, self._frozen(name, self._batch(name), 1)) for at, name in names]
+        names = [name for name, _ in dict.fromkeys(self._decided)]
+        return [(self._functions.index(name), self._frozen(name, self._batch(name), 1)) for name in dict.fromkeys(names)]
 
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers whose signs decide, shape (K,), and their derivatives by x, (K, size), with these outcomes."""
@@ -523,8 +530,9 @@ class Composed(System):
         for at, batch in self._deciding:
             values, slopes = batch.jacobian(*terms[at].inputs(x), batch.columns(self._free))
             found.append(values[0])
-            rows += [terms[at].by_x(slopes[:, k]) / len(values) for k in range(batch.count)]  # along t they are all alike
-        return np.concatenate(found), np.array(rows)
+            each = [terms[at].by_x(slopes[:, k]) / len(values) for k in range(batch.count)] if self.intervals else slopes[0]
+            rows.append(np.array(each))  # along t they are all alike
+        return np.concatenate(found), np.concatenate(rows)
 
     # --- the same with other parameters and sizes -----------------------------------------------------------------
 

@@ -142,14 +142,13 @@ class MapSystem(OfCycles, Algebraic):
         return every[0] if self.rounds == 1 else _Pointwise(every)
 
     @functools.cached_property
-    def conditions(self) -> int:  # type: ignore[override]
-        """Their number, at all points."""
-        return self.rounds * len(self.problem.batch("map").conditions(self._free)) if type(self) is MapSystem else 0
+    def _decided(self) -> list[tuple[str, int]]:
+        """Those of the map at each point."""
+        return [("map", at) for at in self.problem.batch("map").conditions(self._free)] * self.rounds
 
     def written(self, k: int, side: float) -> str:
         """Return what the user has written for a condition and, where there are several points, at which it is."""
-        point, origin = divmod(k, self.conditions // self.rounds)
-        return super().written(origin, side) + (f" at point {point + 1}" if self.rounds > 1 else "")
+        return super().written(k, side) + (f" at point {k * self.rounds // self.conditions + 1}" if self.rounds > 1 else "")
 
     def numbers(self, x: Array) -> tuple[Array, Array]:
         """Return the numbers that decide at all points, and their derivatives by x."""

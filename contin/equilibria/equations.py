@@ -259,9 +259,9 @@ class Algebraic(Spectral, Composed):
         return self._frozen("residual", self._batch("residual", ("residual",)))
 
     @functools.cached_property
-    def conditions(self) -> int:  # type: ignore[override]
-        """Their number; none with a given Jacobian."""
-        return super().conditions if type(self) is Algebraic and self.problem.jacobian is None else 0
+    def _decided(self) -> list[tuple[str, int]]:
+        """None with a given Jacobian."""
+        return super()._decided if type(self) is Algebraic and self.problem.jacobian is None else []
 
     def slopes(self, x: Array) -> Array:
         """Return F_x, shape (equations, size)."""

@@ -88,11 +88,18 @@ class Way(NamedTuple):
 
 
 def conditions(system: Any) -> list[Event]:
-    """Return the test functions of conditions that unknowns decide: positive beyond the frozen outcome."""
-    return [_condition(k) for k in range(system.conditions)]
+    """Return the test functions of conditions that unknowns decide: positive beyond the frozen outcome; one for all knots."""
+    knots = list(system.knots) if system.conditions else []
+    groups = [[k] for k in range(system.conditions) if k not in set(knots)] + [knots] * bool(knots)
+    return [_condition(group) for group in groups]
 
 
-def _condition(k: int) -> Event:
+def hit_of(test: Event, trial: Trial) -> int:
+    """Return the condition whose number is zero at a point that a test function has found."""
+    return max(map(int, test.name.split()), key=lambda k: _beyond(trial)[k])
+
+
+def _condition(group: list[int]) -> Event:
     def between(arc: Arc, _: object) -> list[SpecialPoint] | None:
         if arc.passes(test):
             return [] if refrozen(arc.trial) is not None else None
@@ -107,7 +114,8 @@ def _condition(k: int) -> Event:
             part, looks = (part - slope / bend) / 2 if bend < 0 else 0.0, looks + 1
         return []
 
-    test = Event(Label.CORNER, str(k), lambda trial: float(_beyond(trial)[k]), terminal=True, limit=True, search=between)
+    given: Any = {"function": lambda trial: float(_beyond(trial)[group].max()), "search": between}
+    test = Event(Label.CORNER, " ".join(map(str, group)), terminal=True, limit=True, **given)
     return test
 
 
@@ -148,7 +156,8 @@ def _level(slopes: Array, x: Array, part: float, least: float | None = None) -> 
 
 def with_outcomes(system: Any, x: Array, forced: Mapping[int, float] = MappingProxyType({})) -> Any:
     """Return a system with the outcomes at x, some of them forced; later ones may depend on those before."""
-    sides = np.ones(system.conditions)
+    sides = np.array(system.sides) if system.sides.size else np.ones(system.conditions)
+    sides[list(forced)] = list(forced.values())
     for _ in sides:  # one round more of conditions is right each time
         found = system.with_sides(sides)
         before, sides = sides, np.where(found.numbers(x)[0] >= 0, 1.0, -1.0)
@@ -156,6 +165,15 @@ def with_outcomes(system: Any, x: Array, forced: Mapping[int, float] = MappingPr
         if np.array_equal(sides, before):
             break
     return system.with_sides(sides)
+
+
+def changed_between(before: Trial, behind: Trial) -> list[str]:
+    """Return the conditions that change between two points of a curve in two parameters, as they are written."""
+    base = before.system.solution
+    if not (before.system.on_curve and base.conditions):
+        return []
+    sides = [with_outcomes(at.system.solution, at.x[: at.system.solution.size]).sides for at in (before, behind)]
+    return [base.written(int(k), 0.0) for k in np.flatnonzero(sides[0] != sides[1])]
 
 
 @functools.lru_cache(maxsize=2)
@@ -201,9 +219,8 @@ def ways(system: Any, x: Array, zero: Sequence[int]) -> tuple[list[Way], str, bo
             tangents = _tangents(there, x)
         rates = np.array(sides)[:, None] * there.numbers(x)[1][list(zero)]
         for tangent in tangents:
-            if np.all(rates @ tangent >= -_level(rates, tangent, LOCATED, CORRECTED)) and not any(
-                np.abs(tangent - way.tangent).max() < DOUBLED for way in found
-            ):
+            known = any(np.abs(tangent - way.tangent).max() < DOUBLED for way in found)
+            if not known and np.all(rates @ tangent >= -_level(rates, tangent, LOCATED, CORRECTED)):
                 found.append(Way(there, tangent))
     bends = any(np.any(np.abs(each - slopes[0]) > CERTAIN * noise + LOCATED * np.abs(each).max()) for each in slopes[1:])
     return found, missing, bends

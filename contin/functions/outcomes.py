@@ -1,7 +1,8 @@
 """Functions with frozen outcomes: what a condition decides becomes an input, and the number that decides it a further value.
 
 ``abs(x)`` becomes ``side * x`` and ``a < b`` becomes ``side < 0``, where ``side`` is 1 or -1: one program serves all outcomes,
-and with held sides the functions are smooth where they were not.
+and with held sides the functions are smooth where they were not. A table of `numpy.interp` becomes its first line and, at each
+knot that is on the left, the change from one line to the next.
 """
 
 from __future__ import annotations
@@ -9,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from contin.functions.tape import Tape
+from contin.functions.tape import Number, Tape
 
 #: Operations that a number's sign decides.
-_DECIDED = ("lt", "le", "abs", "sign")
+_DECIDED = ("lt", "le", "abs", "sign", "table")
 
 
 class Outcomes(NamedTuple):
@@ -77,6 +78,14 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int], along: C
         elif name in ("abs", "sign"):
             held = side(new[0], place)
             moved[place] = tape.at("mul", (held, new[0])) if name == "abs" else held
+        elif name == "table" and len(data.coefficients[0]) == 2:
+            x = Number(tape, new[0])
+            lines = [(a, b - a * at) for at, (a, b) in zip(data.origins, data.coefficients)]
+            value = lines[0][0] * x + lines[0][1]
+            for knot, (a, b), (c, d) in zip(data.breaks, lines, lines[1:]):
+                right = Number(tape, side((x - knot).place, place))
+                value = value + (right + 1) / 2 * ((c - a) * (x - knot) + ((c - a) * knot + d - b))
+            moved[place] = tape.number(value).place
         else:
             moved[place] = place if new == operands else tape.at(name, new, data)
     return Outcomes(tuple(moved[place] for place in results), tuple(numbers), tuple(origins))

@@ -42,6 +42,11 @@ def _is_like(point: Point, start: Point) -> bool:
     return point.system.free == start.system.free and type(point.system) is type(start.system)
 
 
+def _tangents(point: Point) -> Sequence[Array]:
+    """Return the tangents of the branches through a junction; of a corner of its half-branches, first of that which came."""
+    return (-point.tangent, *point.details.ways) if point.label == Label.CORNER else point.details.tangents
+
+
 class _Explorer:
     """The search of `diagram`: branches and junctions so far."""
 
@@ -67,7 +72,7 @@ class _Explorer:
             if switches(junction.point):
                 self._switch(junction)
                 continue
-            for which, tangent in enumerate(junction.point.details.tangents):
+            for which, tangent in enumerate(_tangents(junction.point)):
                 for way in (1, -1):
                     if way not in junction.taken[which]:
                         self._leave(junction, which, way, tangent)
@@ -166,8 +171,6 @@ class _Explorer:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
         begins = switches(point)
         known = finding_of(point.details)
-        if point.label == Label.CORNER:
-            return False  # the run takes the straightest way
         if known.is_branch_point and not begins:
             return bool(known.leaving) and self._arrived(point, number, depth)
         return begins and self._met(point, number, depth)
@@ -209,25 +212,30 @@ class _Explorer:
     def _arrived(self, point: Point, number: int, depth: int) -> bool:
         """Note a branch point that a run passes; return True if the way ahead was followed before."""
         for junction in self.result.junctions:
-            matched = self._match(junction.point, point)
+            matched = self._match(junction.point, point) if junction.point.label == point.label else None
             if matched is None:
                 continue
             which, way = matched
             junction.also.append(point)
             junction.taken[which].setdefault(-way, number)
+            if point.label == Label.CORNER:
+                came = point.system.carrier(junction.point.system)(-point.tangent)
+                junction.taken[self._images(junction.point, came)[0][0]].setdefault(1, number)
             if way in junction.taken[which]:
                 return True
             junction.taken[which][way] = number
             return False
-        ahead = {1: number, -1: number}
-        self.result.junctions.append(Junction(point, depth, [ahead, *({} for _ in point.details.tangents[1:])]))
+        known = [{1: number, -1: number}, *({} for _ in _tangents(point)[1:])]
+        if point.label == Label.CORNER:  # half-branches leave along their tangents only
+            known = [{1: number, -1: number}] * 2 + [{-1: number} for _ in known[2:]]
+        self.result.junctions.append(Junction(point, depth, known))
         return False
 
     def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
         """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images."""
         a, b = known.system, point.system
         carry, there = b.carrier(a), seen(a, known.x)
-        here, ahead = seen(a, carry(point.x)), seen(a, carry(point.details.tangents[0]))
+        here, ahead = seen(a, carry(point.x)), seen(a, carry(finding_of(point.details).leaving[0]))
         parameters = slice(a.state_size, None)
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
@@ -247,7 +255,10 @@ class _Explorer:
             gap = here - there
             if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, there, there))):
                 continue
-            cosines = [inner(system, turned, tangent) for tangent in known.details.tangents]
+            cosines = np.array([inner(system, turned, tangent) for tangent in _tangents(known)])
+            if known.label == Label.CORNER:
+                yield int(np.argmax(cosines)), 1
+                continue
             which = int(np.argmax(np.abs(cosines)))
             yield which, int(np.sign(cosines[which]) or 1)
 

@@ -140,6 +140,38 @@ def test_a_solution_beyond_a_jump_is_not_made_up(guess):
         solve(problem, [guess])
 
 
+# --- tables ------------------------------------------------------------------------------------------------------------
+
+
+def tabled(knots, values):
+    """y = f(x) / 2 and x + y = a, with f of a table: a(x) is known, and turns at the knots where its slope changes its sign."""
+    names, start = ["x", "y"], {"a": float(knots[0]) - 1}
+    return AlgebraicProblem(
+        lambda u, p: (u.x + u.y - p.a, u.y - np.interp(u.x, knots, values) / 2), names, start, dynamics=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(["count", "size"], [(12, 1.0), (60, 0.3)])
+def test_knots_of_tables_are_passed_and_labelled_where_they_are_folds(count, size):
+    random = np.random.default_rng(count)
+    knots = np.linspace(-2, 2, count)
+    values = size * np.cumsum(random.normal(size=count))
+    problem, low = tabled(knots, values), knots[0] - 1
+    loads = knots + values / 2
+    steps = np.diff(np.concatenate([[loads[0] - 1], loads, [loads[-1] + 1]]))
+    turns = np.flatnonzero(steps[1:] * steps[:-1] < 0)
+    first = solve(problem, [low - values[0] / 2, values[0] / 2], {"a": float(loads[0]) - 0.5})
+    options = {"free": ["a"], "limits": {"a": (loads.min() - 2, loads.max() + 1)}}
+    branch = trace(first, **options)
+    met = branch.labelled("BC")
+    assert len(turns) > 2 and [point.details.kind for point in met] == ["fold"] * len(turns)
+    np.testing.assert_allclose([point["x"] for point in met], knots[turns], atol=1e-9)
+    np.testing.assert_allclose([point["a"] for point in met], loads[turns], atol=1e-9)
+    assert branch.stop.reason == "limit" and not branch.notes
+    every = trace(first, corners=True, **options)
+    np.testing.assert_allclose([point["x"] for point in every.labelled("BC")], knots, atol=1e-9)
+
+
 # --- conditions at ends ------------------------------------------------------------------------------------------------
 
 
@@ -370,3 +402,26 @@ def test_solutions_between_which_outcomes_newtons_method_goes_round(seed):
     found = solve(problem, system.z[:-1] + np.random.default_rng(seed).normal(size=system.n))
     place = np.append(found.x, system.z[-1])
     assert min(distance(ends, place) for ends in system.pieces()) < 1e-9
+
+
+# --- diagrams, and curves in two parameters -----------------------------------------------------------------------------
+
+
+def test_a_diagram_leaves_corners_from_which_several_ways_lead():
+    """a x = |x| x: x = 0 on both sides of a = 0, and |x| = a on one; each half-branch once."""
+    problem = AlgebraicProblem(lambda u, p: (p.a * u.x - abs(u.x) * u.x,), ["x"], {"a": 0.8}, dynamics=False)
+    found = contin.diagram(solve(problem, [0.8]), free=["a"], limits={"a": (-1, 1)})
+    ends = sorted(tuple(branch[-1].x.round(9) + 0.0) for branch in found.branches)
+    assert ends == [(-1, 1), (0, -1), (0, 1), (1, 1)] and len(found.junctions) == 1
+
+
+@pytest.mark.parametrize("kink", [0.2, 2.0])
+def test_curves_in_two_parameters_say_where_they_meet_corners(kink):
+    """Folds of a - x^2 + b x + k max(b - 1, 0) x: the curve bends at b = 1, a little or too much to go on."""
+    problem = AlgebraicProblem(
+        lambda u, p: (p.a - u.x**2 + p.b * u.x + kink * max(p.b - 1, 0) * u.x,), ["x"], {"a": 1.0, "b": 0.2}, dynamics=False
+    )
+    (fold,) = trace(solve(problem, [1.1]), free=["a"], limits={"a": (-3, 3)}, direction=-1).labelled("LP")
+    curve = contin.curve(fold, free=["a", "b"], limits={"b": (-3, 3), "a": (-9, 9)})
+    told = [note for note in [*curve.notes, str(curve.stop)] if "a corner: max(p.b - 1, 0), line " in note]
+    assert len(told) == 1 and (curve[-1]["b"] == 3 if kink < 1 else curve[-1]["b"] == pytest.approx(1, abs=1e-4))
