@@ -203,14 +203,15 @@ class Network(States):
         arms = {(each.member, each.end): (name, float(np.linalg.norm(each.arm))) for name, each in ends_of}
         both = [(arms.get((name, START)), arms.get((name, FINISH)), one.length) for name, one in self.members.items()]
         pairs = [(a[0], b[0], a[1] + length + b[1]) for a, b, length in both if a and b]
-        for first in self.held:
+        held = [name for name, end in self.held.items() if not end.pushes]  # what pushes only need not be reached
+        for first in held:
             reach = {first: 0.0}
             for _ in self.joints:  # shortest ways along strips
                 for a, b, length in pairs:
                     for one, other in ((a, b), (b, a)):
                         if one in reach:
                             reach[other] = min(reach.get(other, math.inf), reach[one] + length)
-            for name in self.held:
+            for name in held:
                 fixed = [np.array(self.held[joint].held).reshape(-1, 3) for joint in (first, name)]
                 free = np.hstack([np.eye(3) - np.linalg.pinv(rows) @ rows for rows in fixed])  # where they slide to
                 away = places[name] - places[first]

@@ -869,5 +869,7 @@ def test_a_stop_under_a_tip(tmp_path):
     assert met["load"] == pytest.approx(0.6258923107865, rel=1e-10) == left["load"]
     pressed = branch.points[branch.points["load"] == 5][0]
     assert pressed["F_tip_y"] == pytest.approx(5 - 0.6258923107865, rel=1e-9) and branch.points["F_tip_y"].min() > -1e-9
+    away = first_state(parse(STOP.replace("-0.2", "-1.5"), "scene").strip())[0]  # a stop that the strip cannot reach
+    assert away.contacts == ()
     with pytest.raises(ConfigError, match="held.A: only: belongs to slides_in_plane"):
         parse(STOP.replace("A: clamped", "A: {only: pushes}"), "scene")
