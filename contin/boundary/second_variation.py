@@ -522,5 +522,6 @@ def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     second /= np.tile(sizes[n:], 2)[:, None]
     held = [i for places, offset in zip(fixed, (0, n)) for i in (offset + place for place in places)]
     second[:, held] = 0.0  # they do not move
-    open_ones = [i for i in problem.variation.pushes if not by_ends[i].any()]
-    return np.delete(by_ends[:conditions], open_ones, axis=0), (second + second.T) / 2
+    pushes = problem.variation.pushes
+    held = [i for i in range(conditions) if i not in pushes or by_ends[i].any()]  # without contacts that are open
+    return by_ends[held], (second + second.T) / 2

@@ -89,6 +89,7 @@ class Continuation:
         self._conditions = conditions(self.state.system)
         if self._conditions:
             self.state = frozen(self.state)
+        self._curved = self.state.system.on_curve
         self._own = [test for test in self.state.system.events() if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
         general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
@@ -252,7 +253,7 @@ class Continuation:
         self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
         if any(step.end.value(test) >= 0 for test in self._conditions):  # the equations are the same beyond
             self.state = dataclasses.replace(self.state, system=refrozen(step.end))
-        for name in changed_between(arc.before, arc.trial):
+        for name in changed_between(arc.before, arc.trial) if self._curved else ():
             self._notes.inside(f"the curve passes a corner: {name} changes", arc)
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
