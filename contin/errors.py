@@ -70,6 +70,10 @@ class ConvergenceError(ContinError, ArithmeticError):
     """
 
 
+class Grazing(ConvergenceError):
+    """A step has come to a solution that crosses more or fewer jumps of the equations."""
+
+
 def warn(text: str, category: type[Warning]) -> None:
     """Warn at the line outside the package from which it was called, however deep inside it this is."""
     frame, level = sys._getframe(1), 2

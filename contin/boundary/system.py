@@ -16,6 +16,7 @@ import numpy as np
 
 from contin import draws
 from contin.arrays import Array, Indices, Places
+from contin.boundary.crossings import Crossing, crossing_places, crossings, frozen, jumping, next_places, outcomes, stepped
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
@@ -23,13 +24,14 @@ from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolat
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
+from contin.core.step import State
 from contin.core.system import Composed, Inputs, Scales, Term
 from contin.core.trial import Event
-from contin.errors import ProblemError
+from contin.errors import Grazing, ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
-from contin.levels import APART, CORRECTED
+from contin.levels import APART, CORRECTED, LOCATED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
 from contin.linalg.border import random_rows
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
@@ -37,7 +39,7 @@ from contin.linalg.condensation import Factorization
 from contin.problems.statement import Statement
 
 #: What is computed when it is first asked for, and depends on the mesh.
-_ON_A_MESH = ("defect", "_workspaces", "_known", "_monodromies")
+_ON_A_MESH = ("defect", "_workspaces", "_known", "_monodromies", "_in_pieces", "_last_crossings")
 
 
 #: States from which on components are eliminated one by one, in Python. Of rods (14 states each), two take a tenth longer so
@@ -99,6 +101,10 @@ class Collocation(Composed):
     monodromy: Any = None
     #: The vector of unknowns that conditions beyond those of the problem refer to; empty without one.
     reference: Array = np.empty(0)
+    #: The times at which they change, and those of each piece between these times; None where they are not frozen.
+    _pieces: tuple[Array, Array] | None = None
+    #: Those of the solution at which functions were evaluated last: derivatives by points become derivatives by x with them.
+    _last_crossings: Sequence[Crossing] = ()
 
     def __init__(
         self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
@@ -120,6 +126,8 @@ class Collocation(Composed):
         a, b = problem.domain
         if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
+        if self._pieces is not None:
+            self.outcomes = self._pieces[1][np.searchsorted(self._pieces[0], (mesh[1:] + mesh[:-1]) / 2)]
         self.mesh, self._h, self.intervals, self._grid = mesh, h, h.size, (mesh, degree)
         self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
         self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
@@ -138,6 +146,11 @@ class Collocation(Composed):
     def states_count(self) -> int:
         """Number of states, n."""
         return self._n
+
+    @property
+    def by_interval(self) -> Indices:
+        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
+        return self._by_interval
 
     # --- values --------------------------------------------------------------------------------------------------
 
@@ -232,7 +245,7 @@ class Collocation(Composed):
 
     def _with(self, **changes: object) -> Self:
         """Return the same with other free parameters, parameters or scales, and with the same reference."""
-        other, known = super()._with(**changes), self.reference
+        other, known = super()._with(**changes)._with_pieces(self._pieces), self.reference
         if known.size:
             other._refer(other.pack(self.states(known), dict(zip(self.problem.parameters, self.all_parameters(known)))))
         return other
@@ -246,7 +259,8 @@ class Collocation(Composed):
 
     @functools.cached_property
     def _layout(self) -> Layout:
-        return layout(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
+        depends = self.problem.batch("field").depends[: self._n, : self._n]
+        return layout(depends if not self.outcomes.size else np.full_like(depends, True), self.degree)
 
     @property
     def order_of_states(self) -> Indices:
@@ -257,12 +271,79 @@ class Collocation(Composed):
     def _columns(self) -> tuple[Columns, Columns]:
         """Columns of field, by states in the layout's order, and of boundary; each by the free parameters, too."""
         field, boundary = self.problem.batch("field"), self.problem.batch("boundary")
+        field = field if not self.outcomes.size else self._in_pieces
         return field.columns(self._free, self._layout.order), boundary.columns(self._free)
 
     @functools.cached_property
     def _field(self) -> Batch:
         """Right-hand side and integrands, compiled."""
         return self._frozen("field", self._batch("field", ("states", "integrals")))
+
+    @functools.cached_property
+    def _in_pieces(self) -> Any:
+        """The same with frozen outcomes at the Gauss points, where the equations jump."""
+        return frozen(self._field, self.outcomes, self._d) if self.outcomes.size else self._field
+
+    def crossings(self, x: Array) -> Sequence[Crossing]:
+        """Return the mesh points at which a solution crosses jumps; none where outcomes are not frozen."""
+        if self.outcomes.size:
+            self._last_crossings = self._once("crossings", x, lambda: crossings(self, self._field, x))
+        return self._last_crossings
+
+    def _with_pieces(self, pieces: tuple[Array, Array] | None) -> Self:
+        """Return the same with other frozen outcomes."""
+        if pieces is None and self._pieces is None:
+            return self
+        other = self._copied()
+        for name in (*_ON_A_MESH, "_layout", "_columns", "_components", "outcomes"):
+            vars(other).pop(name, None)
+        other._pieces = pieces
+        if pieces is not None:
+            other.outcomes = pieces[1][np.searchsorted(pieces[0], (self.mesh[1:] + self.mesh[:-1]) / 2)]
+        return other
+
+    def crossed(self, x: Array) -> tuple[Self, Array]:
+        """Return the same with mesh points and frozen outcomes where the equations jump along x, and x; else itself."""
+        if self.outcomes.size and not self.contradicts(x):
+            return self, x
+        system = self._with_pieces(None)
+        if not system.switching(x).jumps.any() or not any(name == "field" for name, _ in self._selections):
+            return system, x
+        system, carry = system.on_switches(x) or (system, np.array)
+        t, x = (system.mesh[1:] + system.mesh[:-1]) / 2, carry(x)
+        sides = outcomes(self.problem.batch("field"), t, system.evaluate(x, t), system.all_parameters(x))
+        changes = np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1
+        if not changes.size:
+            return system, x
+        return system._with_pieces((system.mesh[changes], sides[[0, *changes]])), x
+
+    def check_jumps(self, x: Array, state: State) -> None:
+        """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations."""
+        known = len([each for each in self.crossings(x) if np.abs(each.gap).max() > LOCATED])
+        if not (self.contradicts(x) if self.outcomes.size else self.switching(x).jumps.any()):
+            return
+        found = self._with_pieces(None).switching(x)
+        if found.jumps.sum() == known or (state.singular and not known):
+            return
+        other = self.mesh[[each.node for each in self.crossings(x)]] if known else np.array([np.inf])
+        at = int((np.abs(found.places[:, None] - other).min(axis=1) * found.jumps).argmax())
+        which = f"{found.names[at]}, where the equations jump"
+        raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
+
+    def stepped(self, x: Array, change: Array) -> tuple[Self, Array]:
+        """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""
+        mesh, at, after = stepped(self, x, change)
+        assert self._pieces is not None
+        other = self._with_pieces((at, self._pieces[1]))
+        return other.on_mesh(mesh)[0], after
+
+    def contradicts(self, x: Array) -> bool:
+        """Return whether a solution has other outcomes at a Gauss point than those that are frozen there."""
+        if not self.outcomes.size:
+            return False
+        t = self.gauss_times
+        there = outcomes(self.problem.batch("field"), t, self.evaluate(x, t), self.all_parameters(x))
+        return bool((there != self.outcomes.repeat(self._d, axis=0)).any())
 
     @functools.cached_property
     def _boundary(self) -> Batch:
@@ -291,7 +372,7 @@ class Collocation(Composed):
         def by_x(slopes: Array) -> Array:
             return np.concatenate([slopes[0, :n], np.zeros(self.state_size - 2 * n), slopes[0, n:]])
 
-        inside = Term(self, self._field, self._inside, rows, weights, self._to_nodes)
+        inside = Term(self, self._in_pieces, self._inside, rows, weights, self._to_nodes)
         return inside, Term(self, self._boundary, self._at_ends, rows_at_ends, lambda w: w[None, first:last], by_x)
 
     @property
@@ -302,7 +383,10 @@ class Collocation(Composed):
 
     def _inside(self, x: Array) -> Inputs:
         """Return where functions of t are evaluated: at the Gauss points."""
-        return self.gauss_times, self.at_gauss_points(x), _NONE(self._n), self.scaled_parameters(x)
+        points = self.at_gauss_points(x)
+        for each in self.crossings(x):
+            points.reshape(self.intervals, self._d, -1)[each.node] += self.basis.value[:, :1] * each.shift
+        return self.gauss_times, points, _NONE(self._n), self.scaled_parameters(x)
 
     def _at_ends(self, x: Array) -> Inputs:
         """Return where boundary conditions are evaluated."""
@@ -314,11 +398,14 @@ class Collocation(Composed):
     def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
         residual = np.empty(self._conditions)
         collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
+        for each in self.crossings(x):
+            inside = residual[: self._inner].reshape(self.intervals, self._d, -1)
+            inside[each.node] += self.basis.slope[:, :1] * each.shift
         return residual
 
     def residual(self, x: Array) -> Array:
         """Return the residual of the discrete equations at x, shape (equations,); further conditions come last."""
-        inside = self._residual(x, self._field.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
+        inside = self._residual(x, self._in_pieces.values(*self._inside(x)), self._boundary.values(*self._at_ends(x)))
         return np.concatenate([inside, self.condition_values(x)]) if self._further else inside
 
     # --- conditions beyond those of the problem: each is a row of its own, and may depend on all unknowns ----------
@@ -352,11 +439,24 @@ class Collocation(Composed):
     def _assembled(self, x: Array, rows: Array, columns: Array) -> tuple[Array, Blocks]:
         """Return the residual at x, and the blocks of that matrix."""
         boundary, ends = self._boundary.jacobian(*self._at_ends(x), self._columns[1])
-        field, jacobian = self._field.jacobian(*self._inside(x), self._columns[0])
+        field, jacobian = self._in_pieces.jacobian(*self._inside(x), self._columns[0])
         blocks = self._empty_blocks(len(rows), len(columns))
         given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
         run(assemble, given, self._segments(blocks.local.size), (True, False))
+        k, q, left = len(self.free), self.problem.integral_size, self._left
+        for each in self.crossings(x):
+            local, border = blocks.local[each.node], blocks.border[each.node, :q]
+            local[:, self._n * (self._d + 1) :][:, :k] += local[:, left] @ each.by_free
+            blocks.corner[:q, :k] += border[:, left] @ each.by_free
+            for block in (local, border):
+                block[:, left] = block[:, left] @ each.by_states
         return self._residual(x, field, boundary), blocks
+
+    @property
+    def _left(self) -> Indices:
+        """Places of the left end's states among the columns of an interval, in the order of the states."""
+        ends = self._layout.ends
+        return (self._n * (self._d - 1) + np.argsort(ends)[: self._n]).astype(np.int64)
 
     def _empty_blocks(self, rows: int, columns: int) -> Blocks:
         """Return blocks for so many rows and columns around F_x."""
@@ -370,7 +470,7 @@ class Collocation(Composed):
     @functools.cached_property
     def _components(self) -> list[Component]:
         """Parts of the states that meet at the ends only, where they are eliminated one by one; none where all are together."""
-        if self._n < _APART:
+        if self._n < _APART or self.outcomes.size:
             return []
         found = components(self.problem.batch("field").depends[: self._n, : self._n], self.degree)
         return found if len(found) > 1 else []
@@ -436,7 +536,7 @@ class Collocation(Composed):
         inside, ends = self._terms
         result = inside.transposed(x, w) + ends.transposed(x, w)
         rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
-        np.add.at(result[: self.state_size].reshape(-1, self._n), self._by_interval, rates)
+        result = result + self._gathered(rates, np.zeros(len(self.free)))
         return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
 
     @property
@@ -448,7 +548,7 @@ class Collocation(Composed):
         """Return the largest entries of the rows of boundary and integral conditions."""
         of_field, of_boundary = self._columns
         ends = self._boundary.jacobian(*self._at_ends(x), of_boundary)[1][0]
-        field = self._field.jacobian(*self._inside(x), of_field)[1][:, self._n :]
+        field = self._in_pieces.jacobian(*self._inside(x), of_field)[1][:, self._n :]
         return {"boundary": np.abs(ends).max(axis=1, initial=0.0), "integrals": np.abs(field).max(axis=(0, 2), initial=0.0)}
 
     def slopes(self, x: Array) -> Array:
@@ -457,10 +557,17 @@ class Collocation(Composed):
 
     def _to_nodes(self, slopes: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
-        n, by_points = self._n, slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        by_node = np.zeros((self.nodes.size, n))
-        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
-        return np.append(by_node.ravel(), slopes[:, n:].sum(axis=0))
+        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        return self._gathered(np.einsum("qm,jqa->jma", self.basis.value, by_points), slopes[:, self._n :].sum(axis=0))
+
+    def _gathered(self, blocks: Array, free: Array) -> Array:
+        """Return derivatives by x, shape (size,), from those by the states of each interval, (N, d + 1, n), and others."""
+        for each in self._last_crossings:
+            free = free + blocks[each.node, 0] @ each.by_free
+            blocks[each.node, 0] = blocks[each.node, 0] @ each.by_states
+        by_node = np.zeros((self.nodes.size, self._n))
+        np.add.at(by_node, self._by_interval, blocks)
+        return np.append(by_node.ravel(), free)
 
     # --- functionals ---------------------------------------------------------------------------------------------
 
@@ -529,7 +636,7 @@ class Collocation(Composed):
 
     def _made_workspace(self) -> Workspace | None:
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
-        if own is None or not recorded or self._components or not 0 <= self.size - self.equations <= 1:
+        if own is None or not recorded or self._components or self.outcomes.size or not 0 <= self.size - self.equations <= 1:
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
@@ -565,7 +672,10 @@ class Collocation(Composed):
         breaks = self._all_breaks(x, closely)
         if not breaks.size or near(breaks, self.mesh, self.mesh[-1] - self.mesh[0]).all():
             return None
-        return self.on_mesh(moved_to_breaks(self.mesh, breaks))
+        system = self
+        if self._pieces is not None:
+            system = self._with_pieces((next_places(self, x), self._pieces[1]))
+        return system.on_mesh(moved_to_breaks(self.mesh, breaks))
 
     def _all_breaks(self, x: Array, closely: bool) -> Array:
         """Return the places where the equations are not smooth; those on mesh points, as far as it matters, are these."""
@@ -608,7 +718,9 @@ class Collocation(Composed):
 
         def made() -> Switching:
             sizes = functools.partial(self._sizes_of, x=x)
-            return joined([switching(self, each, functools.partial(sizes, name), x) for name, each in self._selections])
+            frozen = [crossing_places(self, x)] if self.outcomes.size else []
+            given = [(name, each) for name, each in self._selections if not frozen or name != "field"]
+            return joined([*frozen, *(switching(self, each, functools.partial(sizes, name), x) for name, each in given)])
 
         return self._once("switching", x, made)
 
@@ -639,8 +751,8 @@ class Collocation(Composed):
         return self.with_reference(x)
 
     def events(self) -> list[Event]:
-        """Return those of the statement."""
-        return self.problem.events()
+        """Return those of the statement and, where the equations jump, of crossings that end."""
+        return [*self.problem.events(), *(jumping() if self.outcomes.size else ())]
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the statement says."""

@@ -40,6 +40,7 @@ def corrected_first(system: Discretization, x: Array, settings: Settings, primar
 
     Raises ConvergenceError where Newton's method fails.
     """
+    system, x = system.crossed(x)
     for _ in range(ROUNDS_OF_MESHES):
         system, x, row = _on_switches(system, x, settings, primary)
         adapted = system.adapted(x, settings.mesh)

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contin.collocation.corners import Switching
-from contin.core.labels import BY_VALUES, CONFIRMED, Label
+from contin.core.labels import CONFIRMED, Label
 from contin.core.settings import Settings
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
@@ -41,7 +40,7 @@ class Notes:
     def __init__(self, primary: str, tolerance: float, moves: bool) -> None:
         self.texts: list[str] = []
         self.primary, self.tolerance, self.moves, self.is_noisy = primary, tolerance, moves, False
-        self._said: set[str] = set()
+        self._said = False
 
     def place(self, trial: Trial) -> str:
         """Return where a point lies."""
@@ -71,12 +70,11 @@ class Notes:
             self.add(f"contacts at {self.place(trial)}: {', '.join(states)}")
 
     def corners(self, trial: Trial) -> None:
-        """Note once that conditions on states make the equations jump, and once that mesh points do not follow them."""
-        tolerance = self.tolerance if self.moves else math.inf
-        for kind, note in (("jump", jump(trial, self.primary)), ("unsettled", unsettled(trial, tolerance, self.primary))):
-            if note and kind not in self._said:
-                self._said.add(kind)
-                self.add(note)
+        """Note once that mesh points do not follow corners and jumps."""
+        note = unsettled(trial, self.tolerance if self.moves else math.inf, self.primary)
+        if note and not self._said:
+            self._said = True
+            self.add(note)
 
     def phases(self, found: SpecialPoint, error: float) -> bool:
         """Note the phase conditions that load a labelled point, known to ``error``; return whether they make a branch point.
@@ -112,35 +110,18 @@ class Notes:
             self.inside(f"from here on {what}", arc)
 
 
-def jump(trial: Trial, primary: str) -> str:
-    """Return a note if the equations jump at some place of a solution; "" otherwise."""
-    found = trial.system.switching(trial.x)
-    if not (found.places.size and found.jumps.any()):
-        return ""
-    where = _where(found, int(np.argmax(found.jumps)), trial, primary)
-    return (
-        f"the equations jump where {where}: derivatives leave this out, so special points and stability are not told from "
-        "there on; a SegmentedProblem with one segment on each side of the jump tells them"
-    )
-
-
 def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
     """Return a note if conditions switch inside intervals of the mesh, and that matters; "" otherwise."""
     found = trial.system.switching(trial.x)
     if not (found.places.size and (found.costs > tolerance).any()):
         return ""
-    where = _where(found, int(np.argmax(found.costs)), trial, primary)
+    at = int(np.argmax(found.costs))
+    where = f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
     return f"no mesh has a point where {where}: from there on the points are as exact as discretization_error says"
-
-
-def _where(found: Switching, at: int, trial: Trial, primary: str) -> str:
-    return f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
 
 
 def why_lost(trial: Trial, is_located: bool) -> str:
     """Return why a special point has no label: a clause."""
-    if trial.system.switching(trial.x).jumps.any():
-        return "lies where the equations jump"
     return "was not found again on a finer mesh" if is_located else "was bracketed, and not located"
 
 
@@ -156,10 +137,8 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     first, coarse = found.trial, found.trial.system.coefficient(found)
     if found.errors is None and labelled and settings.errors:
         again = refined(found.same_as or found, settings)
-        details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
-        if found.label not in BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
-            errors, is_lost = dict.fromkeys(errors, np.nan), True
-        found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
+        details = found.details if found.same_as else again.details
+        found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors, is_lost=again.is_lost)
     if coarse is not None:
         better = coarse if found.trial is first else found.trial.system.coefficient(found)
         found = with_normal_form(found, better or coarse, coarse, settings.errors)

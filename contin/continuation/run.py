@@ -30,7 +30,7 @@ from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
 from contin.core.step import Reason, State, Stop
 from contin.core.trial import Linearization, Trial
-from contin.errors import ConvergenceError
+from contin.errors import ConvergenceError, Grazing
 from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.corner import Way, changed_between, conditions, corner_at, hit_of, on_mesh_of, refrozen
 from contin.events.inspection import Start
@@ -216,6 +216,10 @@ class Continuation:
             step = self._step(self.state)
         except ConvergenceError as error:
             here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
+            if isinstance(error, Grazing):
+                self.stop = Stop(Reason.EVENT, str(error), event="grazing")
+                yield self._point(SpecialPoint(0.0, Label.GRAZING, "grazing", here), self.state, accuracy=self._accuracy)
+                return
             failed = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
             stop = self.state.system.explained(failed, here)
             if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
@@ -255,6 +259,9 @@ class Continuation:
             self.state = dataclasses.replace(self.state, system=refrozen(step.end))
         for name in changed_between(arc.before, arc.trial) if self._curved else ():
             self._notes.inside(f"the curve passes a corner: {name} changes", arc)
+        other = self.state.system.crossed(self.state.x)[0]  # corners, which come and go where they do not matter
+        if other is not self.state.system:
+            self.go_on(self._meshes.moved(self.state, self.here, (other, self.state.system.carrier(other))))
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[0])

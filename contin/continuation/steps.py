@@ -88,6 +88,7 @@ class Steps:
         self._stay_off_trivial(state, before, trial)
         if settings.mesh.every:
             trial = settled(trial, state.tangent, settings.newton)
+            trial.settled.system.check_jumps(trial.settled.x, state)
         return Arc(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
 
     def accepted(self, arc: Arc, judgement: Judgement, turned: bool) -> State:

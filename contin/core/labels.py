@@ -14,6 +14,8 @@ class Label(enum.StrEnum):
     USER_ZERO = "UZ"
     EXTREMUM = "EX"
     CORNER = "BC"
+    GRAZING = "GR"
+    SLIDING = "SL"
     FOLD = "LP"
     BRANCH_POINT = "BP"
     HOPF = "HB"

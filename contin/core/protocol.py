@@ -236,6 +236,8 @@ class Discretization(Equations, Protocol):
     conditions: int = 0
     sides: Array = np.empty(0)
     knots: Sequence[int] = ()
+    #: Outcomes of the conditions along a solution on the intervals, where the equations jump; empty where they are not frozen.
+    outcomes: Array = np.empty((0, 0))
 
     @property
     def thawed(self) -> Any:
@@ -270,6 +272,14 @@ class Discretization(Equations, Protocol):
     def stability(self, point: Any) -> Any:
         """Return the `Stability` of a point of a kind with an index; at a special one, what vanishes there does not count."""
         return None
+
+    def crossed(self, x: Array) -> tuple[Any, Array]:
+        """Return the same with frozen outcomes where the solution x crosses jumps of the equations, and x."""
+        return self, x
+
+    def check_jumps(self, x: Array, state: Any) -> None:
+        """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations."""
+        return
 
     @property
     def size_of_solutions(self) -> Any:

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
+from contin.boundary.crossings import jumping
 from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
 from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
@@ -31,7 +32,7 @@ from contin.events.normal_forms import Coefficient, at_special_point
 from contin.levels import APART, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import Blocks, Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.periodic import interval_matrices, log_eigenvalues_along
+from contin.linalg.periodic import interval_matrices, log_eigenvalues, log_eigenvalues_along
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.statement import PERIOD, rounds_of
 
@@ -87,7 +88,7 @@ class OfCycles(Discretization):
 
     def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
-        return [doubling(self.order), torus()]
+        return [doubling(self.order), torus(), *(jumping() if self.outcomes.size else ())]
 
     def events_on_folds(self: Any) -> list[Event]:
         """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
@@ -235,11 +236,6 @@ class PeriodicCollocation(OfCycles, Collocation):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
-    @property
-    def by_interval(self) -> Indices:
-        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
-        return self._by_interval
-
     def rates_by_states(self, x: Array, points: Array) -> Array:
         """Return the derivatives of T F by the states at states (K, n) divided by their sizes, shape (K, n, n).
 
@@ -265,6 +261,8 @@ class PeriodicCollocation(OfCycles, Collocation):
         columns = np.concatenate([self._layout.inside, self._layout.ends])
         border = np.empty((self.intervals, 0, len(columns)))
         local = np.ascontiguousarray(matrices[:, self._layout.rows[:, None], columns])
+        for each in self.crossings(x):
+            local[each.node][:, self._left] = local[each.node][:, self._left] @ each.by_states
         first, last = np.ascontiguousarray(rows[:, :n]), np.ascontiguousarray(rows[:, n:])
         return Factorization(self._layout, Blocks(local, border, np.empty((0, 0)), first, last))
 
@@ -318,6 +316,11 @@ class PeriodicCollocation(OfCycles, Collocation):
 
     def _resolved(self, x: Array, room: Monodromy, outcome: int) -> ComplexArray:
         """Return the logarithms of the multipliers; on a finer mesh where intervals are too long for them."""
+        if outcome != COARSE and self.outcomes.size:
+            matrices = room.matrices.copy()
+            for each in self.crossings(x):
+                matrices[each.node] = matrices[each.node] @ each.by_states
+            return log_eigenvalues(matrices)
         if outcome != COARSE:
             return room.real + 1j * room.imaginary
         finer, carry = self.on_mesh(resolving(self, room))
@@ -486,7 +489,7 @@ class CycleCollocation(PeriodicCollocation):
         After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
         """
         room, outcome = self._filled(x)
-        if outcome == DRIFTED:
+        if outcome == DRIFTED and not self.outcomes.size:
             self._drifted.add(x.tobytes())
             flow, count = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d])), len(room.matrices)
             values = log_eigenvalues_along(room.matrices, np.concatenate([flow[:count], flow[:1]]))
@@ -550,6 +553,15 @@ class CycleCollocation(PeriodicCollocation):
             self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 
+    def crossed(self, x: Array) -> tuple[CycleCollocation, Array]:
+        """Return the same with frozen outcomes where a cycle crosses jumps, and the cycle begun far from all of them."""
+        if not self.outcomes.size and self.switching(x).jumps.any():
+            places = self.switching(x).places
+            gaps = np.diff(places, append=places[0] + 1)
+            shift = float((places + gaps / 2)[gaps.argmax()])
+            return super(CycleCollocation, self.with_reference(self.moved(x, shift))).crossed(self.moved(x, shift))
+        return super().crossed(x)
+
     # --- the reference -----------------------------------------------------------------------------------
 
     def with_reference(self, x: Array) -> Self:
@@ -562,7 +574,7 @@ class CycleCollocation(PeriodicCollocation):
 
     def events(self) -> list[Event]:
         """Return also that of homoclinic orbits; in the plane that alone: beside 1 there is one positive multiplier."""
-        is_planar = self.states_count == 2 and self.order == 1
+        is_planar = self.states_count == 2 and self.order == 1 and not self.outcomes.size
         return [homoclinic()] if is_planar else [*super().events(), homoclinic()]
 
     @property

@@ -16,51 +16,12 @@ from contin.equilibria.equations import Algebraic
 from contin.events.arc import SpecialPoint
 from contin.events.dips import NO_MULTIPLIER
 from contin.events.normal_forms import Coefficient, at_special_point
-from contin.functions.batch import Batch
+from contin.functions.batch import Batch, Piecewise
 from contin.levels import DOUBLED
 from contin.linalg.blocks import MANY
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.statement import ROUNDS, rounds_of
-
-
-class _Pointwise:
-    """A batch for each point."""
-
-    #: What is frozen is recorded.
-    interpreted = None
-
-    def __init__(self, batches: Sequence[Batch]) -> None:
-        self.batches, self.count, self.columns = batches, batches[0].count, batches[0].columns
-
-    def values(self, *given: Any) -> Array:
-        """Return values at all points; the others, as of a `Batch`, likewise."""
-        return np.concatenate(self._each("values", given))
-
-    def jacobian(self, *given: Any) -> list[Array]:
-        return [np.concatenate(parts) for parts in zip(*self._each("jacobian", given))]
-
-    def entries(self, *given: Any) -> list[Array]:
-        return [np.concatenate(parts) for parts in zip(*self._each("entries", given))]
-
-    def along(self, *given: Any) -> Array:
-        return np.concatenate(self._each("along", given))
-
-    def bent(self, *given: Any) -> Array:
-        return np.concatenate(self._each("bent", given))
-
-    def _each(self, name: str, given: Any) -> list[Any]:
-        t, u, v, p, *rest = given
-
-        def at(item: Any, k: int) -> Any:
-            if isinstance(item, list):
-                return [at(each, k) for each in item]
-            return item[k : k + 1] if isinstance(item, np.ndarray) else item
-
-        return [
-            getattr(batch, name)(t[k : k + 1], u[k : k + 1], v, p, *(at(item, k) for item in rest))
-            for k, batch in enumerate(self.batches)
-        ]
 
 
 class MapSystem(OfCycles, Algebraic):
@@ -139,7 +100,7 @@ class MapSystem(OfCycles, Algebraic):
         if not self.sides.size:
             return batch
         every = [batch.frozen(self._free, sides)[which] for sides in self.sides.reshape(self.rounds, -1)]
-        return every[0] if self.rounds == 1 else _Pointwise(every)
+        return every[0] if self.rounds == 1 else Piecewise(every, range(self.rounds))
 
     @functools.cached_property
     def _decided(self) -> list[tuple[str, int]]:
@@ -311,7 +272,7 @@ class MapSystem(OfCycles, Algebraic):
     # --- what is known of its branches --------------------------------------------------------------------------
 
     @property
-    def small_equations(self) -> Batch | None:
+    def small_equations(self) -> Any:
         """The map, of fixed points."""
         return self._residual if type(self) is MapSystem and self.rounds == 1 else None
 

@@ -703,5 +703,44 @@ class Batch:
         return self._own.load(_VALUES if columns is None else columns.request._replace(order=order))
 
 
+class Piecewise:
+    """Recorded functions, other ones for each piece of the points: ``starts`` are the numbers of the first points."""
+
+    interpreted = None
+
+    def __init__(self, batches: Sequence[Any], starts: Sequence[int]) -> None:
+        self.batches, self.count, self.columns = batches, batches[0].count, batches[0].columns
+        self._pieces = [slice(*ends) for ends in zip(starts, [*starts[1:], None])]
+
+    def values(self, *given: Any) -> Array:
+        """Return values at all points; the others, as of a `Batch`, likewise."""
+        return np.concatenate(self._each("values", given))
+
+    def jacobian(self, *given: Any) -> Any:
+        return [np.concatenate(parts) for parts in zip(*self._each("jacobian", given))]
+
+    def entries(self, *given: Any) -> Any:
+        return [np.concatenate(parts) for parts in zip(*self._each("entries", given))]
+
+    def along(self, *given: Any) -> Array:
+        return np.concatenate(self._each("along", given))
+
+    def bent(self, *given: Any) -> Array:
+        return np.concatenate(self._each("bent", given))
+
+    def _each(self, name: str, given: Any) -> list[Any]:
+        t, u, v, p, *rest = given
+
+        def at(item: Any, piece: slice) -> Any:
+            if isinstance(item, list):
+                return [at(each, piece) for each in item]
+            return item[piece] if isinstance(item, np.ndarray) else item
+
+        return [
+            getattr(batch, name)(t[piece], u[piece], v, p, *(at(item, piece) for item in rest))
+            for batch, piece in zip(self.batches, self._pieces)
+        ]
+
+
 #: The values.
 _VALUES = Request()

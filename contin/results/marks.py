@@ -61,6 +61,8 @@ _MARKS = {
     "EP": (".", Colour.BLACK, "end"),
     "LP": ("*", Colour.VERMILION, "fold"),
     "BC": ("v", Colour.VERMILION, "corner"),
+    "GR": ("v", Colour.PURPLE, "grazing"),
+    "SL": ("v", Colour.GREEN, "sliding"),
     "BP": ("o", Colour.BLACK, "branch point"),
     "HB": ("s", Colour.GREEN, "Hopf point"),
     "UZ": ("D", Colour.PURPLE, "given value"),

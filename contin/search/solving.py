@@ -26,7 +26,7 @@ from contin.core.system import System, usual
 from contin.draws import ASIDE
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ConvergenceError, ProblemError
-from contin.levels import APART, MOST_STEPS
+from contin.levels import APART, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.orientation import first_least
 from contin.problems.angles import winding_names
 from contin.problems.statement import declared, forget_changed, with_multipliers
@@ -180,9 +180,7 @@ def solved(
     if explains and not others and held is None and (why := of_family(system, x)):
         raise ProblemError(why)
     for _ in range(ROUNDS_OF_MESHES):
-        done = corrected(system, x)
-        if control.every:
-            system, done = _on_switches(system, done, corrected)
+        system, done = _crossed(system, x, corrected, held) if control.every else (system, corrected(system, x))
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break
@@ -195,6 +193,60 @@ def solved(
     system.check_solution(done.x)
     point = point_of(system, done.x, done.iterations, done.error)
     return dataclasses.replace(point, label=label_of(system, done.x)) if done.singular else point
+
+
+def _crossed(
+    system: System, x: Array, corrected: Callable[[System, Array], Corrected], held: str | None
+) -> tuple[System, Corrected]:
+    """Return the solution near x on a mesh with points where conditions on states switch, with outcomes frozen at jumps.
+
+    Raises
+    ------
+    ConvergenceError
+        Outcomes go round.
+    """
+    told = ""
+    for _ in range(ROUNDS):
+        system, x = _moved(*system.crossed(x), held)
+        try:
+            system, done = _on_switches(system, corrected(system, x), corrected)
+        except ConvergenceError as error:
+            if not (told := told or _jumps(system, x)):
+                raise
+            raise ConvergenceError(f"{error}; {told}") from None
+        other, x = system.crossed(done.x)
+        if other is system:
+            return system, done
+        system, told = other, _jumps(system, done.x)
+    raise ConvergenceError(f"no sequence of jumps fits a solution; {told}")
+
+
+def _jumps(system: Any, x: Array) -> str:
+    """Return where the equations jump along x, and whether a solution would slide there; "" where they do not."""
+    found = system.switching(x)
+    places = checks.listed(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
+    slides = ", and the fields on both sides point there: a solution that slides is stated as a SegmentedProblem"
+    there = slides if system.outcomes.size and any(each.rates[1] < 0 for each in system.crossings(x)) else ""
+    return f"the equations jump along the guess (tried last: {places}){there}" if found.jumps.any() else ""
+
+
+def _moved(system: Any, x: Array, held: str | None) -> tuple[Any, Array]:
+    """Return a guess with its crossings where Newton's method takes them, up to what one correction on a mesh leaves.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    for _ in range(MOST_UPDATES if system.outcomes.size else 0):
+        rows = [] if held is None else [np.eye(1, system.size, system.parameter_index(held))[0]]
+        residual, factors = system.linearize(x, rows)
+        step = -factors.solve(np.append(residual, np.zeros(len(rows))))
+        if not np.isfinite(step).all():
+            break
+        system, x = system.stepped(x, step)
+        if np.abs(step / (1 + np.abs(x))).max() <= ROUGH:
+            break
+    return system, x
 
 
 def _on_switches(system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]) -> tuple[System, Corrected]:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import contin
@@ -234,7 +234,7 @@ def test_a_beam_on_a_foundation_that_does_not_pull():
 
 @pytest.mark.full
 def test_dry_friction():
-    """x'' + x + .3 sign(x') = cos(w t): the largest x by Den Hartog (1930). The equations jump, and that is noted."""
+    """x'' + x + .3 sign(x') = cos(w t): the largest x by Den Hartog (1930)."""
     problem = CycleProblem(
         lambda t, u, p: (u.v, -u.x - 0.3 * np.sign(u.v) + np.cos(p.w * t)), ["x", "v"], {"w": 1.3},
         period=lambda p: 2 * np.pi / p.w,
@@ -246,13 +246,14 @@ def test_dry_friction():
         friction = 0.3 * np.sin(np.pi / w) / (w * (1 + np.cos(np.pi / w)))
         known = np.sqrt(1 / (1 - w**2) ** 2 - friction**2)
         assert abs(point["max_x"] - known) <= 1e-10 * known
-    (note,) = branch.notes
-    assert note.startswith("the equations jump where v changes its sign (t = 0.4")
+    assert not branch.notes
 
 
-@pytest.mark.full
-def test_a_fold_on_a_jump_has_no_label():
-    """u'' + q exp(u) (1 or .97): derivatives leave the jump out."""
+def test_a_fold_on_a_jump():
+    """u'' + q exp(u) (1 or .97), by quadrature: the half length 1 / 2 is the time from 0 to the largest u, M, with u'(M) = 0.
+
+    The branch ends where M comes down to the threshold .5.
+    """
     problem = BoundaryValueProblem(
         lambda t, u, p: (u.v, -p.q * np.exp(u.u) * (0.97 if u.u > 0.5 else 1.0)),
         lambda a, b, p: (a.u, b.u),
@@ -261,8 +262,20 @@ def test_a_fold_on_a_jump_has_no_label():
     )
     start = contin.solve(problem, lambda t: (12 * t * (1 - t), 12 - 24 * t), {"q": 2.5})
     branch = contin.trace(start, free=["q"], limits={"q": (0.5, 5)}, max_points=40)
-    assert not branch.labelled("LP")
-    assert any("the equations jump where 0.5 - u changes its sign" in note for note in branch.notes)
+    (fold,) = branch.labelled("LP")
+
+    def q_of(m):
+        def above(s):
+            return 2 / math.sqrt(1.94 * math.exp(m) * (-math.expm1(-s * s) / s**2 if s else 1))
+
+        energy = 1.94 * (math.exp(m) - math.exp(0.5))
+        below = quad(lambda u: 1 / math.sqrt(energy + 2 * (math.exp(0.5) - math.exp(u))), 0, 0.5, epsabs=1e-13)[0]
+        return 4 * (quad(above, 0, math.sqrt(m - 0.5), epsabs=1e-13)[0] + below) ** 2
+
+    largest = fold.system.evaluate(fold.x, np.array([0.5]))[0, 0]
+    assert abs(q_of(largest) - fold["q"]) < 1e-11
+    assert q_of(largest + 1e-3) < fold["q"] and q_of(largest - 1e-3) < fold["q"]
+    assert branch[-1].label == "GR" and abs(branch[-1]["q"] - q_of(0.5 + 1e-8)) < 1e-3 and not branch.notes
 
 
 def test_a_mesh_that_is_kept():

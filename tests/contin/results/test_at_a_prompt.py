@@ -59,8 +59,8 @@ def test_a_name_that_is_not_there_is_answered_with_those_that_are():
 
 def test_a_label_that_nothing_has_is_told():
     branch = trace(solve(PROBLEM, [0, 0]), free=["lam"], limits={"lam": (0, 1)})
-    with pytest.warns(UserWarning, match=r"no point has the label 'L' \(did you mean 'LP'\?\)"):
-        assert branch.labelled("L") == []
+    with pytest.warns(UserWarning, match=r"no point has the label 'LP1' \(did you mean 'LP'\?\)"):
+        assert branch.labelled("LP1") == []
     assert branch.labelled("HB") == []  # it may have one: nothing to tell
 
 

@@ -1,0 +1,191 @@
+"""Jumps of the equations that the solution decides: outcomes of conditions frozen on each interval, crossings at mesh points.
+
+A crossing lies at a mesh point but for what a solution moves it by. With g the number that decides, f- and f+ the right sides
+before and behind it, and u the states at the mesh point, it happens later by
+
+    delay = -g / g',   g' = g_t + g_u f-,
+
+and the interval behind begins with other states, to first order in the delay:
+
+    u+ = u + (f- - f+) delay,   du+/du = 1 + (f+ - f-) g_u / g'   (the saltation matrix).
+
+Mesh points are moved by the delays until these are round-off. So no polynomial crosses a jump, and derivatives by states and
+parameters, tangents and multipliers are those of the solution with its jumps.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin import errors as checks
+from contin.arrays import Array
+from contin.collocation.corners import Switching
+from contin.collocation.mesh import interpolation
+from contin.core.labels import Label
+from contin.core.trial import Event, Trial
+from contin.errors import Grazing
+from contin.functions.batch import Batch, Piecewise
+from contin.functions.origin import source
+from contin.levels import CORRECTED, DOUBLED
+
+#: Largest part of its length that a piece between crossings loses in a step of Newton's method.
+_SHRINKS = 0.8
+#: Part of the domain over which g_t is taken by a difference.
+_LATER = 1e-6
+
+
+class Crossing(NamedTuple):
+    """A mesh point at which outcomes change.
+
+    Attributes
+    ----------
+    node : int
+        Number of the mesh point.
+    condition : int
+    delay : float
+    by_x : ndarray, shape (n + k,)
+        Derivatives of the delay by the states and the free parameters, scaled.
+    gap : ndarray, shape (n,)
+        f- - f+, scaled.
+    rates : tuple of float
+        g' before and behind, positive where g goes to the side behind.
+    """
+
+    node: int
+    condition: int
+    delay: float
+    by_x: Array
+    gap: Array
+    rates: tuple[float, float]
+
+    @property
+    def shift(self) -> Array:
+        """The change of the states with which the interval behind begins, u+ - u."""
+        return self.gap * self.delay
+
+    @property
+    def by_states(self) -> Array:
+        """The saltation matrix."""
+        return np.eye(self.gap.size) + np.outer(self.gap, self.by_x[: self.gap.size])
+
+    @property
+    def by_free(self) -> Array:
+        """Derivatives of u+ by the free parameters, shape (n, k)."""
+        return np.outer(self.gap, self.by_x[self.gap.size :])
+
+
+def outcomes(batch: Batch, t: Array, u: Array, p: Array) -> Array:
+    """Return on which side of all conditions points are, 1 or -1, shape (points, conditions), in the user's units."""
+    recorded = batch.recorded
+    assert recorded is not None
+    every = tuple(range(len(batch.signature.parameters)))
+
+    def made() -> Any:
+        tape, places = recorded.recording.tape, recorded.outcomes(every).origins
+        operations = [tape.operations[place] for place in places]
+        return recorded.function([tape.at("sub", each[1]) if each[0] in ("lt", "le") else each[1][0] for each in operations])
+
+    return np.where(recorded._once(("deciding", every), made)(t, u, p) >= 0, 1.0, -1.0)
+
+
+def frozen(batch: Batch, sides: Array, degree: int) -> Piecewise:
+    """Return functions at Gauss points with the outcomes ``sides`` (N, K) on the intervals."""
+    starts = np.flatnonzero(np.append(True, (sides[1:] != sides[:-1]).any(axis=1)))
+    every = range(len(batch.signature.parameters))
+    return Piecewise([batch.frozen(every, sides[j])[0] for j in starts], (degree * starts).tolist())
+
+
+def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
+    """Return the crossings of a solution; ``batch`` is the field in scaled units."""
+    n, sides, found = system.states_count, system.outcomes, list[Crossing]()
+    every, later = range(len(system.parameters)), _LATER * (system.mesh[-1] - system.mesh[0])
+    for j in (np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1).tolist():
+        (first, numbers), (last, _) = (batch.frozen(every, sides[i]) for i in (j - 1, j))
+        k = int(np.flatnonzero(sides[j] != sides[j - 1])[0])
+        t, u = system.mesh[j : j + 1], system._scaled_states(x)[[system.degree * j]]
+        rest = u, np.empty((0, n)), system.scaled_parameters(x)
+        values, slopes = numbers.jacobian(t, *rest, numbers.columns(system._free))
+        (before,), (behind,) = (each.values(t, *rest)[:, :n] for each in (first, last))
+        in_time = 0.0
+        if batch.signature.times:
+            in_time = float(np.subtract(*(numbers.values(t + part, *rest)[0, k] for part in (later, -later)))) / (2 * later)
+        slope = slopes[0, k]
+        rate, after = (in_time + slope[:n] @ each for each in (before, behind))
+        signs = sides[j, k] * rate, sides[j, k] * after
+        found.append(Crossing(j, k, float(-values[0, k] / rate), -slope / rate, before - behind, signs))
+    return found
+
+
+def crossing_places(system: Any, x: Array) -> Switching:
+    """Return where crossings are, as places of a mesh; those up to round-off cost nothing."""
+    found, mesh, batch = system.crossings(x), system.mesh, system.problem.batch("field")
+    origins = batch.conditions(range(len(batch.signature.parameters)))
+    names = tuple(source(batch, origins[each.condition]) for each in found)
+    ends, delays = mesh[[0, *(each.node for each in found), -1]], np.array([each.delay for each in found])
+    costs = [np.abs(each.shift / (1 + system.largest(x)[: each.gap.size])).max() for each in found]
+    known = np.where(np.abs(delays) > CORRECTED * (mesh[-1] - mesh[0]), costs, 0.0)
+    return Switching(ends[1:-1] + delays, known, np.full(len(found), True), names)
+
+
+def next_places(system: Any, x: Array) -> Array:
+    """Return where crossings are; raise Grazing where a piece between them would lose most of its length."""
+    found = crossing_places(system, x)
+    ends = system.mesh[[0, *(each.node for each in system.crossings(x)), -1]]
+    lost = np.diff([ends[0], *found.places, ends[-1]]) < (1 - _SHRINKS) * np.diff(ends)
+    if lost.any():
+        at = int(np.argmax(lost))
+        which = checks.listed(dict.fromkeys(found.names[max(at - 1, 0) : at + 1]))
+        raise Grazing(f"met grazing: {which}, the piece between jumps at t = {ends[at]:.6g} and {ends[at + 1]:.6g} vanishes")
+    return found.places
+
+
+@functools.cache
+def jumping() -> list[Event]:
+    """Return the test functions that end a run: where the number of crossings changes, and where a solution would slide."""
+    return [
+        Event(Label.GRAZING, "grazing", lambda trial: _clearance(trial)[0], terminal=True),
+        Event(Label.SLIDING, "sliding", lambda trial: min((each.rates[1] for each in _at(trial)), default=1.0), terminal=True),
+    ]
+
+
+def _at(trial: Trial) -> Sequence[Crossing]:
+    found: Sequence[Crossing] = trial.system.crossings(trial.x)
+    return found
+
+
+def _clearance(trial: Trial) -> tuple[float, str]:
+    """Return how far a solution is from more or fewer crossings, and of which condition.
+
+    That is the least length of a piece, as a part of the domain, less what counts as none; and the least distance from a jump
+    between two crossings, at an extremum of the number that decides.
+    """
+    system = trial.system
+    found, mesh = _at(trial), system.mesh
+    lengths = np.diff(mesh[[0, *(each.node for each in found), -1]] + np.array([0.0, *(each.delay for each in found), 0.0]))
+    return float(lengths.min() / (mesh[-1] - mesh[0]) - DOUBLED), ""
+
+
+def stepped(system: Any, x: Array, change: Array) -> tuple[Array, Array, Array]:
+    """Return mesh, times of the crossings and x behind a step of Newton's method, in which mesh points move with the crossings.
+
+    The step is shortened where a piece between crossings would lose most of its length.
+    """
+    n, d, k, found, mesh = system.states_count, system.degree, system.state_size, system.crossings(x), system.mesh
+    at = [each.node for each in found]
+    moves = np.array(
+        [each.delay + each.by_x @ np.append(change[:k].reshape(-1, n)[d * each.node], change[k:]) for each in found]
+    )
+    ends, shorter = mesh[[0, *at, -1]], -np.diff(moves, prepend=0, append=0)
+    part = min(1.0, _SHRINKS / max((shorter / np.diff(ends)).max(), _SHRINKS))
+    blocks = (x + part * change)[:k].reshape(-1, n)[system.by_interval]
+    blocks[at, 0] += part * np.array([each.gap for each in found]) * moves[:, None]
+    tables, moved = system.basis, ends + part * np.concatenate([[0.0], moves, [0.0]])
+    lagrange = 1 / np.prod(tables.points[:, None] - tables.points + np.eye(d), axis=1)
+    slopes = interpolation(tables.points, lagrange, tables.nodes) @ tables.slope @ blocks / np.diff(mesh)[:, None, None]
+    blocks += slopes * (np.interp(system.nodes, ends, moved) - system.nodes)[system.by_interval][..., None]
+    states = np.append(blocks[0, :1], blocks[:, 1:].reshape(-1, n), axis=0)
+    return np.interp(mesh, ends, moved), moved[1:-1], np.append(states.ravel(), x[k:] + part * change[k:])

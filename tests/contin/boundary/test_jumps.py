@@ -1,0 +1,181 @@
+"""Jumps of the equations that the solution decides: relays, bang-bang controls, switches with a threshold."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import contin
+
+
+def fuel(t, u, p):
+    """Rest to rest over a distance 1 in the time T with the least fuel: thrust where |q| > 1; the fuel is T - sqrt(T^2 - 4)."""
+    thrust = (1.0 if u.q < -1 else 0.0) - (1.0 if u.q > 1 else 0.0)
+    return p.T * u.v, p.T * thrust, 0.0, -p.T * u.r, p.T * abs(thrust)
+
+
+FUEL = contin.BoundaryValueProblem(
+    fuel, lambda a, b, p: (a.x, a.v, b.x - 1, b.v, a.used), ["x", "v", "r", "q", "used"], {"T": 3.0}
+)
+GUESSES = [
+    lambda t: (t, 1 / 3, -2.0, -3 + 6 * t, 0.0),
+    lambda t: (3 * t**2 - 2 * t**3, 2 * t * (1 - t), -1.0, -1.5 + 3 * t, t),
+]
+
+
+def used(point):
+    return point.system.states(point.x)[-1, -1]
+
+
+@pytest.mark.parametrize("guess", GUESSES)
+def test_bang_off_bang(guess):
+    point = contin.solve(FUEL, guess)
+    assert abs(used(point) - (3 - math.sqrt(5))) < 1e-13
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_bang_off_bang_along_the_time(direction):
+    branch = contin.trace(contin.solve(FUEL, GUESSES[0]), free=["T"], limits={"T": (2.1, 5)}, direction=direction)
+    assert branch.stop.reason == "limit" and not branch.notes
+    for point in branch:
+        assert abs(used(point) - (point["T"] - math.sqrt(point["T"] ** 2 - 4))) < 1e-11
+
+
+def test_a_piece_that_vanishes_is_located():
+    """The coasting piece has the length sqrt(T^2 - 4) / T."""
+    branch = contin.trace(contin.solve(FUEL, GUESSES[0], {"T": 2.2}), free=["T"], limits={"T": (1, 5)}, direction=-1)
+    assert branch.stop.reason == "event" and branch[-1].label == "GR"
+    assert abs(branch[-1]["T"] - 2) < 1e-11
+
+
+def thresholds(t, u, p):
+    return u.v, -u.x - p.a * (1 if u.x > 0.3 else -1)
+
+
+def shot(a):
+    """x(0) = 0 and x(2) = .8 from both pieces in closed form: the speed at 0, and the time of the jump."""
+
+    def rest(v):
+        time = brentq(lambda t: a - a * math.cos(t) + v * math.sin(t) - 0.3, 0, 1.0)
+        speed, left = a * math.sin(time) + v * math.cos(time), 2 - time
+        return -a + (0.3 + a) * math.cos(left) + speed * math.sin(left) - 0.8, time
+
+    speed = brentq(lambda v: rest(v)[0], 0.4, 4)
+    return speed, rest(speed)[1]
+
+
+def test_against_closed_forms():
+    problem = contin.BoundaryValueProblem(thresholds, lambda a, b, p: (a.x, b.x - 0.8), ["x", "v"], {"a": 0.5}, domain=(0, 2))
+    first = contin.solve(problem, lambda t: (0.4 * t, 0.4))
+    branch = contin.trace(first, free=["a"], limits={"a": (0.1, 1)})
+    for point in branch:
+        speed, time = shot(point["a"])
+        assert abs(point.system.states(point.x)[0, 1] - speed) < 1e-10
+        assert np.abs(point.system.mesh - time).min() < 1e-10
+    assert (
+        branch.stop.reason == "limit" and not branch.notes and max(point.discretization_error for point in branch[1:]) < 1e-11
+    )
+
+
+def test_the_transposed_matrix():
+    problem = contin.BoundaryValueProblem(thresholds, lambda a, b, p: (a.x, b.x - 0.8), ["x", "v"], {"a": 0.5}, domain=(0, 2))
+    system, x = (
+        (point := contin.trace(contin.solve(problem, lambda t: (0.4 * t, 0.4)), free=["a"], max_points=2)[0]).system,
+        point.x,
+    )
+    random = np.random.default_rng(1)
+    w, v = random.standard_normal(system.equations), random.standard_normal(system.size)
+    step = 1e-6
+    along = (system.residual(x + step * v) - system.residual(x - step * v)) / (2 * step)
+    assert abs(system.transposed_product(x, w) @ v - w @ along) < 1e-6
+
+
+def welander(u, p):
+    """A box of water that is cooled and freshened from above, and mixed with the deep where it is denser (Welander 1982)."""
+    k = 5.0 if p.a * u.S - u.T > p.e else 0.0
+    return 1 - u.T - k * u.T, (1 - u.S) / 2 - k * u.S
+
+
+def flip_flop(a, e):
+    """Return period, first states and multipliers of the box from both pieces in closed form, with the saltation matrices."""
+    n = np.array([-1.0, a])
+
+    def flow(z, k, t):
+        rates = np.array([1 + k, 0.5 + k])
+        rest = np.array([1.0, 0.5]) / rates
+        return rest + (z - rest) * np.exp(-rates * t)
+
+    def field(z, k):
+        return np.array([1.0, 0.5]) - np.array([1 + k, 0.5 + k]) * z
+
+    def following(z, k):
+        times = np.linspace(1e-3, 20, 4000)
+        values = flow(z, k, times[:, None]) @ n - e
+        at = int(np.flatnonzero(values[1:] * values[0] < 0)[0])
+        return brentq(lambda t: n @ flow(z, k, t) - e, times[at], times[at + 1], xtol=1e-15)
+
+    z, k, lengths, monodromy = np.array([0.3, 0.3]), 5.0, [], []
+    for _ in range(40):
+        t = following(z, k)
+        z = flow(z, k, t)
+        before, behind = field(z, k), field(z, 5.0 - k)
+        jump = np.eye(2) + np.outer(behind - before, n) / (n @ before)
+        monodromy.append(jump @ np.diag(np.exp(-np.array([1 + k, 0.5 + k]) * t)))
+        lengths.append(t)
+        k = 5.0 - k
+    return lengths[-1] + lengths[-2], flow, z, k, lengths[-2:], np.linalg.eigvals(monodromy[-1] @ monodromy[-2])
+
+
+def test_a_relay_and_its_multipliers():
+    period, flow, z, k, (first, _), multipliers = flip_flop(1.2, -0.01)
+
+    def guess(t):
+        t = t * period
+        return flow(z, k, t) if t < first else flow(flow(z, k, first), 5.0 - k, t - first)
+
+    cycle = contin.solve(contin.CycleProblem(welander, ["T", "S"], {"a": 1.2, "e": -0.01}), guess, {"period": 1.1 * period})
+    assert abs(cycle["period"] - period) < 1e-9
+    assert np.allclose(np.sort(np.exp(cycle.system.eigenvalues(cycle.x)).real), np.sort(multipliers), rtol=0, atol=1e-8)
+    branch = contin.trace(cycle, free=["e", "period"], limits={"e": (-0.03, -0.004)})
+    assert branch.stop.reason == "limit" and not branch.notes
+    for point in branch[1:]:
+        wanted, *_, multipliers = flip_flop(1.2, point["e"])
+        assert abs(point["period"] - wanted) < 1e-8
+        assert np.allclose(np.sort(np.exp(point.system.eigenvalues(point.x)).real), np.sort(multipliers), rtol=0, atol=1e-7)
+
+
+def test_a_threshold_that_is_touched_is_located():
+    """u'' = -q - .3 [u > .1] - .3 [u > .3]: the largest u reaches .3 where the times below and above .1 are 1 / 2."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.q - 0.3 * (u.u > 0.1) - 0.3 * (u.u > 0.3)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 1.0}
+    )
+    branch = contin.trace(contin.solve(problem, lambda t: (t * (1 - t), 1 - 2 * t)), free=["q"], limits={"q": (0.5, 4)})
+
+    def excess(q):
+        first, there = math.sqrt(2 * (0.3 * q + 0.06)), math.sqrt(0.4 * (q + 0.3))
+        return (first - there) / q + math.sqrt(0.4 / (q + 0.3)) - 0.5
+
+    assert branch[-1].label == "GR" and "0.3 - u, where the equations jump" in branch.stop.message
+    assert abs(branch[-1]["q"] - brentq(excess, 1, 3)) < 1e-4
+
+
+def test_corners_may_come_and_go():
+    """A corner of the spring, at .3, where the load jumps at .1: the run goes on, and stays exact."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.q - 0.3 * (u.u > 0.1) - 0.3 * max(u.u - 0.3, 0)), lambda a, b, p: (a.u, b.u), ["u", "v"],
+        {"q": 1.0},
+    )  # fmt: skip
+    branch = contin.trace(contin.solve(problem, lambda t: (t * (1 - t), 1 - 2 * t)), free=["q"], limits={"q": (0.5, 4)})
+    assert branch.stop.reason == "limit" and not branch.notes
+    assert len(branch[-1].system.crossings(branch[-1].x)) == 4
+    assert branch[-1].discretization_error < 1e-11
+
+
+def test_a_sliding_solution_is_told():
+    """u reaches .2, and the fields on both sides point there."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (p.a * (-1.0 if u.u > 0.2 else 1.0) + 0.1,), lambda a, b, p: (a.u,), ["u"], {"a": 1.0}
+    )
+    with pytest.raises(contin.ConvergenceError, match="u.u > 0.2.* at t = .*the fields on both sides point there"):
+        contin.solve(problem, lambda t: (0.5 * t,))
