@@ -35,66 +35,61 @@ def parser() -> Parser:
     return parser
 
 
-def follow(branch: StoredBranch, point: int, second: str, between) -> tuple[Branch, str]:
-    """Return the curve of folds through a kept point in the units of contin, and the number that the branch follows.
-
-    Raises
-    ------
-    ConfigError, ContinError
-        The point is no fold, or the second number is none; or the curve cannot be followed from there.
-    """
+def follow(branch: StoredBranch, point: int, second: str, between) -> Branch:
+    """Return the curve of folds through a kept point; raise ConfigError for no fold, or a number that cannot be followed."""
     system, x = branch.discretized(point)
-    first, factor = system.free[0], branch.scene.factor(second)
     if branch.points["label"][point].decode() != Label.FOLD:
         raise ConfigError("--point: must be a fold (LP); its number is in the column LAB of the run")
     numbers = getattr(branch.scene, "law_parameters", system.problem.parameters)  # not the length of a closed strip, which is 1
     known = [name for name in branch.columns.shown() if name in numbers and name not in system.free]
     if second not in known:
         raise ConfigError(f"--against: {one_of(second, known)}")
-    low, high = sorted(end / factor for end in between)
-    here = system.parameter(x, second)
+    (low, high), here = sorted(end / branch.scene.factor(second) for end in between), system.parameter(x, second)
     if not low <= here <= high or low == high:
-        raise ConfigError(f"--between: must hold the value of the result, {second} = {here * factor:g}")
-    start = dataclasses.replace(point_of(system, x), label=Label.FOLD, column=first)
-    return curve(start, second, direction="both", limits={second: (low, high)}), first
+        raise ConfigError(f"--between: must hold the value of the result, {second} = {here * branch.scene.factor(second):g}")
+    start = dataclasses.replace(point_of(system, x), label=Label.FOLD, column=system.free[0])
+    return curve(start, second, direction="both", limits={second: (low, high)})
 
 
 def main(argv=None) -> int:
     """Follow; return the exit code."""
     options = parser().parse_args(argv)
     try:
-        out = Path(options.out) if options.out else None
-        if out and out.suffix != ".csv":
-            check_picture(out)
+        out = Path(options.out or ".csv")
+        (prepare if out.name.endswith(".csv") else check_picture)(out)
         branch = read_branch(options.result)
-        found, first = follow(branch, labelled_point(branch, options.point), options.against, options.between)
-        names = options.against, first
-        values = [np.array([point[name] for point in found]) * branch.scene.factor(name) for name in names]
-        titles = [branch.titled(name) for name in names]
-        rows = [f"{x:.10g},{y:.10g},{point.label}\n" for x, y, point in zip(*values, found)]
-        table = "".join([",".join([*titles, "label"]) + "\n", *rows])
-        if out and out.suffix == ".csv":
-            prepare(out)
-            write_bytes(out, table.encode())
-        elif out:
-            write_picture(_figure(branch, names, values, found), out)
+        point = labelled_point(branch, options.point)
+        found, names = (
+            follow(branch, point, options.against, options.between),
+            (options.against, branch.followed(branch.stage_of[point])),
+        )
+        s, *values = np.transpose(
+            [(one.arclength, *(one[name] * branch.scene.factor(name) for name in names)) for one in found]
+        )
+        lines = [f"{x:.10g},{y:.10g},{one.label}\n" for x, y, one in zip(*values, found)]
+        table = f"{','.join(map(branch.titled, names))},label\n{''.join(lines)}"
+        if out.name.endswith(".csv"):
+            write_bytes(out, table.encode()) if options.out else write_output(table)
+        else:
+            write_picture(_figure(branch, names, smooth(s, s, *values)[1:]), out)
     except (ConfigError, StoreError, ContinError) as error:
         complain(f"error: {error}")
         return 2
     ends = values[0].min(), values[0].max()
     why = "" if np.allclose(ends, sorted(options.between)) else f" ({found.stop})"
-    told = f"{len(found)} folds, {titles[0]} from {ends[0]:.6g} to {ends[1]:.6g}{why}\nwritten to {out}\n"
-    write_output(told if out else table)
+    told = f"{len(found)} folds, {branch.titled(names[0])} from {ends[0]:.6g} to {ends[1]:.6g}{why}\nwritten to {out}\n"
+    write_output(told if options.out else "")
     return 0
 
 
-def _figure(branch: StoredBranch, names, values, found: Branch):
+def _figure(branch: StoredBranch, names, values):
     from matplotlib.figure import Figure
 
     axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
-    axes.plot(*smooth(s := [point.arclength for point in found], s, *values)[1:], color="black")
-    axes.set(**{f"{axis}label": branch.axis(name)[1] for axis, name in zip("xy", names)})
-    axes.set_title(f"folds of {branch.about.partition(', nu')[0]}")
+    axes.plot(*values, color="black")
+    axes.set(
+        xlabel=branch.axis(names[0])[1], ylabel=branch.axis(names[1])[1], title=f"folds of {branch.about.partition(', nu')[0]}"
+    )
     return figure
 
 
