@@ -75,7 +75,9 @@ def _figure(branch, panels, chosen: list[int], width: float | None, view: View, 
         for handle, word in zip(*axes.get_legend_handles_labels()):
             handles.setdefault(word, handle)
         axes.get_legend().remove()
-    style = {"loc": "outside lower center", "ncols": 4 if wide > points(7) else 2, "frameon": False}
+    if narrow := 2 * max(map(len, handles), default=0) > 16 * wide:  # letters of two columns, and those of a line
+        result.set_figheight(result.get_figheight() + points(0.12) * len(handles))
+    style = {"loc": "outside lower center", "ncols": 1 if narrow else 4 if wide > points(7) else 2, "frameon": False}
     rows[-1].legend(handles.values(), handles.keys(), fontsize=points(11), **style)
     result.suptitle(branch.caption, fontsize=points(12))
     return result
@@ -249,7 +251,8 @@ def put(axes, texts, curves: np.ndarray) -> None:
     """Write texts beside their places, each on the side of it where it hides least of curves (K, 2), marks and other texts."""
     to_screen = axes.transData.transform
     dot = axes.figure.dpi / 72
-    hidden = to_screen(curves) / dot
+    fine, number = np.arange(0, len(curves) - 1, 0.1), np.arange(len(curves))  # a text may lie between two points of a curve
+    hidden = to_screen(np.column_stack([np.interp(fine, number, column) for column in curves.T])) / dot
     marks = [to_screen(place) / dot for place, *_ in texts]
     frame = axes.get_window_extent().padded(-2 * dot)
     low, high = np.array(frame.min) / dot, np.array(frame.max) / dot
@@ -259,9 +262,9 @@ def put(axes, texts, curves: np.ndarray) -> None:
             continue
         half = points(1) * np.array([_WIDE * len(text), _HIGH])
         best = None
-        for way in range(_WAYS):
+        for way in range(2 * _WAYS):  # near, then twice as far away
             ahead = np.array([math.cos(2 * math.pi * way / _WAYS), math.sin(2 * math.pi * way / _WAYS)])
-            middle = at + ahead * (points(_AWAY) + np.abs(ahead) @ half)
+            middle = at + ahead * (points(_AWAY) * (1 + way // _WAYS) + np.abs(ahead) @ half)
             cost = np.count_nonzero((np.abs(hidden - middle) < half).all(axis=1))
             cost += 100 * sum((np.abs(other - middle) < half + 6).all() for other in marks)
             cost += 200 * any(np.hypot(*(other - middle)) < np.hypot(*(at - middle)) - 1 for other in marks)
