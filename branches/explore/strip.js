@@ -13,8 +13,8 @@ function hasWebGL() {
 
 /** Width of the strip in units of L / 2 pi. */
 const width = () => (Number($("width").value) / 100) * 2 * Math.PI;
-/** A tight coil is drawn larger than to scale, but smaller than a single loop; open strips are all drawn to one scale. */
-const scaleOf = (strip) => DATA.scale || 0.86 / reach(strip) ** 0.6;
+/** A tight coil is drawn larger than to scale, but smaller than a single loop; open strips are all drawn to one that fits. */
+const scaleOf = (strip) => DATA.scale * Math.min(1, (0.8 * $("ribbon").clientWidth) / $("ribbon").clientHeight || 1) || 0.86 / reach(strip) ** 0.6;
 
 const LIT = {
   hoverinfo: "skip",
