@@ -29,13 +29,11 @@ def copied(values: dict) -> dict:
             turns[name] = int(found[1]), "xyz".index(found[2])
     if not turns:
         return values
-    found = dict(values)
-    for part in ("strips", "joints", "held", "loads", "stages"):
-        if part == "joints" and isinstance(values.get(part), dict):  # a joint of copies is copied, too
-            turns |= {name: own for name, joint in values[part].items() if (own := _turns_of(joint, turns))}
-        if part in values:
-            found[part] = _written(values[part], turns)
-    return found
+    joints = values.get("joints")
+    if isinstance(joints, dict):  # a joint of copies is copied, too
+        turns |= {name: own for name, joint in joints.items() if (own := _turns_of(joint, turns))}
+    parts = ("strips", "joints", "held", "loads", "stages")
+    return values | {part: _copy(values[part], turns) for part in parts if part in values}
 
 
 def _turns_of(value: Any, turns: dict) -> tuple[int, int] | None:
@@ -46,21 +44,6 @@ def _turns_of(value: Any, turns: dict) -> tuple[int, int] | None:
     return next((own for place in places if isinstance(place, str) and (own := _turns_of(place, turns))), None)
 
 
-def _written(value: Any, turns: dict) -> Any:
-    """Return fields with names of copies in place of the names of what is copied."""
-    if isinstance(value, list):
-        return [_written(one, turns) for one in value]
-    if not isinstance(value, dict):
-        return value
-    found: dict = {}
-    for name, one in value.items():
-        if own := _turns_of(name, turns) if isinstance(name, str) else None:
-            found |= {_at(name, k, turns): _turned(one, k, own, turns) for k in range(own[0])}
-        else:
-            found[name] = _turned(one, 0, (1, 2), turns) if isinstance(one, list) else _written(one, turns)
-    return found
-
-
 def _at(place: str, k: int, turns: dict) -> str:
     """Return the name of a copy in a place."""
     name, _, rest = place.removeprefix("next ").partition(" ")
@@ -68,29 +51,30 @@ def _at(place: str, k: int, turns: dict) -> str:
     return f"{name}_{number} {rest}".rstrip()
 
 
-def _turned(value: Any, k: int, own: tuple[int, int], turns: dict, key: str = "") -> Any:
-    """Return the fields of a copy: vectors are turned, and names are those of copies."""
-    if isinstance(value, str) and key != "section" and _turns_of(value, turns):
-        return _at(value, k, turns)
+def _copy(value: Any, turns: dict, k: int | None = None, own: tuple[int, int] = (1, 2), key: str = "") -> Any:
+    """Return fields with copies in place of what is copied; of copy k, whose vectors are turned, if one is given."""
+    if k is not None and key in ("along", "normal") and isinstance(value, str) and value in _WORDS:
+        value = _WORDS[value]
     if isinstance(value, str):
-        return _turned(_WORDS[value], k, own, turns) if key in ("along", "normal") and value in _WORDS else value
-    if isinstance(value, dict):
-        fixed = key == "arm"  # of a joint: on the directors of the strips
-        return {
-            _at(name, k, turns) if _turns_of(name, turns) else name: one if fixed else _turned(one, k, own, turns, name)
-            for name, one in value.items()
-            if name != "copies"
-        }
+        return value if k is None or key == "section" or not _turns_of(value, turns) else _at(value, k, turns)
+    found: Any = {} if isinstance(value, dict) else []
+    for name, one in value.items() if isinstance(value, dict) else ():
+        each = _turns_of(name, turns) if isinstance(name, str) else None
+        if each and k is None:
+            found |= {_at(name, j, turns): _copy(one, turns, j, each) for j in range(each[0])}
+        elif each:  # an angle, or an arm on the directors of its end, which turns with it
+            found[_at(name, k, turns)] = one
+        elif name != "copies":
+            found[name] = _copy(one, turns, k, own, name)
     if not isinstance(value, list):
-        return value
+        return found if isinstance(value, dict) else value
     if k and len(value) == 3 and all(type(x) in (int, float) for x in value):
         a, (count, axis) = np.array(value, float), own
         c, s = math.cos(2 * math.pi * k / count), math.sin(2 * math.pi * k / count)
         a[[axis - 2, axis - 1]] = c * a[axis - 2] - s * a[axis - 1], s * a[axis - 2] + c * a[axis - 1]
         return (np.round(a, 15) + 0.0).tolist()
-    found: list = []
     for one in value:
         every = one.removeprefix("every ") if isinstance(one, str) and one.startswith("every ") else ""
-        all_of = _turns_of(every, turns) or (0, 0)
-        found += [_at(every, j, turns) for j in range(all_of[0])] or [_turned(one, k, own, turns)]
+        count, _ = _turns_of(every, turns) or (0, 0)
+        found += [_at(every, j, turns) for j in range(count)] or [_copy(one, turns, k, own)]
     return found
