@@ -16,7 +16,6 @@ parameters, tangents and multipliers are those of the solution with its jumps.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,10 +29,12 @@ from contin.core.trial import Event, Trial
 from contin.errors import Grazing
 from contin.functions.batch import Batch, Piecewise
 from contin.functions.origin import source
-from contin.levels import CORRECTED, DOUBLED
+from contin.levels import CORRECTED, DOUBLED, ROUGH
 
 #: Largest part of its length that a piece between crossings loses in a step of Newton's method.
 _SHRINKS = 0.8
+#: Parabolas with which a minimum of a number over t is found.
+_PARABOLAS = 4
 #: Part of the domain over which g_t is taken by a difference.
 _LATER = 1e-6
 
@@ -78,8 +79,8 @@ class Crossing(NamedTuple):
         return np.outer(self.gap, self.by_x[self.gap.size :])
 
 
-def outcomes(batch: Batch, t: Array, u: Array, p: Array) -> Array:
-    """Return on which side of all conditions points are, 1 or -1, shape (points, conditions), in the user's units."""
+def deciding(batch: Batch, t: Array, u: Array, p: Array) -> Array:
+    """Return the numbers whose signs decide all conditions, shape (points, conditions), in the user's units."""
     recorded = batch.recorded
     assert recorded is not None
     every = tuple(range(len(batch.signature.parameters)))
@@ -89,7 +90,13 @@ def outcomes(batch: Batch, t: Array, u: Array, p: Array) -> Array:
         operations = [tape.operations[place] for place in places]
         return recorded.function([tape.at("sub", each[1]) if each[0] in ("lt", "le") else each[1][0] for each in operations])
 
-    return np.where(recorded._once(("deciding", every), made)(t, u, p) >= 0, 1.0, -1.0)
+    found: Array = recorded._once(("deciding", every), made)(t, u, p)
+    return found
+
+
+def outcomes(*given: Any) -> Array:
+    """Return on which side of all conditions points are, 1 or -1."""
+    return np.where(deciding(*given) >= 0, 1.0, -1.0)
 
 
 def frozen(batch: Batch, sides: Array, degree: int) -> Piecewise:
@@ -143,30 +150,60 @@ def next_places(system: Any, x: Array) -> Array:
     return found.places
 
 
-@functools.cache
-def jumping() -> list[Event]:
-    """Return the test functions that end a run: where the number of crossings changes, and where a solution would slide."""
-    return [
-        Event(Label.GRAZING, "grazing", lambda trial: _clearance(trial)[0], terminal=True),
-        Event(Label.SLIDING, "sliding", lambda trial: min((each.rates[1] for each in _at(trial)), default=1.0), terminal=True),
-    ]
-
-
-def _at(trial: Trial) -> Sequence[Crossing]:
-    found: Sequence[Crossing] = trial.system.crossings(trial.x)
+def _of(trial: Trial) -> Sequence[Crossing]:
+    found: Sequence[Crossing] = trial.settled.system.crossings(trial.settled.x)
     return found
 
 
-def _clearance(trial: Trial) -> tuple[float, str]:
-    """Return how far a solution is from more or fewer crossings, and of which condition.
+@functools.cache
+def jumping() -> list[Event]:
+    """Return the test functions that end a run: where a piece vanishes, a threshold is touched, or a solution would slide."""
 
-    That is the least length of a piece, as a part of the domain, less what counts as none; and the least distance from a jump
-    between two crossings, at an extremum of the number that decides.
+    def shortest(trial: Trial) -> float:
+        system, found = trial.settled.system, _of(trial)
+        ends = system.mesh[[0, *(each.node for each in found), -1]] + [0.0, *(each.delay for each in found), 0.0]
+        return float(np.diff(ends).min() / (ends[-1] - ends[0]) - DOUBLED)
+
+    def slides(trial: Trial) -> float:
+        return min((each.rates[1] for each in _of(trial)), default=1.0)
+
+    return [
+        Event(Label.GRAZING, "grazing", shortest, terminal=True),
+        Event(Label.GRAZING, "grazing", lambda trial: clearance(trial.settled.system, trial.settled.x)[0], terminal=True),
+        Event(Label.SLIDING, "sliding", slides, terminal=True),
+    ]
+
+
+def clearance(system: Any, x: Array) -> tuple[float, str]:
+    """Return the least distance from a jump between crossings, at a minimum of a number over t; and where that is.
+
+    It is positive on the side whose outcome is frozen. At corners the right sides differ in proportion to the number.
     """
-    system = trial.system
-    found, mesh = _at(trial), system.mesh
-    lengths = np.diff(mesh[[0, *(each.node for each in found), -1]] + np.array([0.0, *(each.delay for each in found), 0.0]))
-    return float(lengths.min() / (mesh[-1] - mesh[0]) - DOUBLED), ""
+    batch, t, p = system.problem.batch("field"), system.gauss_times, system.all_parameters(x)
+    every, sides, best = range(p.size), system.outcomes.repeat(system.degree, axis=0), (1.0, "")
+
+    def there(times: Array) -> Array:
+        return deciding(batch, times, system.evaluate(x, times), p)
+
+    h = there(t) * sides
+    low = (h[1:-1] <= h[:-2]) & (h[1:-1] < h[2:]) & (sides[:-2] == sides[2:]) & (sides[1:-1] == sides[2:])
+    for i, k in np.argwhere(low).tolist():
+        side, at, step = sides[i + 1], t[i + 1], t[i + 2] - t[i]
+        other = np.where(np.arange(side.size) == k, -side, side)
+        for _ in range(_PARABOLAS):
+            before, value, behind = side[k] * there(at + step * np.array([-1.0, 0.0, 1.0]))[:, k]
+            bend, slope = before - 2 * value + behind, before - behind
+            at, step = at + step * float(np.clip(slope / (2 * bend), -1, 1)) if bend > 0 else at, step / 10
+        times = np.array([at, t[i], t[i + 2]])
+        (f, g), u = (batch.frozen(every, each)[0] for each in (side, other)), system.evaluate(x, times)
+        gaps = np.abs(f.values(times, u, u[:0], p) - g.values(times, u, u[:0], p)).max(axis=1)
+        numbers = side[k] * there(times)[:, k]
+        far = 1 + int(np.argmax(np.abs(numbers[1:] - numbers[0])))
+        jumps = abs(gaps[0] - gaps[far] * abs(numbers[0] / numbers[far])) > ROUGH * gaps[far]
+        if jumps and numbers[0] < best[0]:
+            origin = batch.conditions(every)[k]
+            best = float(numbers[0]), f"{source(batch, origin)}, where the equations jump, changes its sign at t = {at:.6g}"
+    return best
 
 
 def stepped(system: Any, x: Array, change: Array) -> tuple[Array, Array, Array]:

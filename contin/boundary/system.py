@@ -10,13 +10,24 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
 
 from contin import draws
 from contin.arrays import Array, Indices, Places
-from contin.boundary.crossings import Crossing, crossing_places, crossings, frozen, jumping, next_places, outcomes, stepped
+from contin.boundary.crossings import (
+    Crossing,
+    clearance,
+    crossing_places,
+    crossings,
+    frozen,
+    jumping,
+    next_places,
+    outcomes,
+    stepped,
+)
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
@@ -24,14 +35,14 @@ from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolat
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
-from contin.core.step import State
+from contin.core.step import State, Stop
 from contin.core.system import Composed, Inputs, Scales, Term
-from contin.core.trial import Event
+from contin.core.trial import Event, Trial
 from contin.errors import Grazing, ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
-from contin.levels import APART, CORRECTED, LOCATED
+from contin.levels import APART, CORRECTED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
 from contin.linalg.border import random_rows
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
@@ -319,16 +330,13 @@ class Collocation(Composed):
 
     def check_jumps(self, x: Array, state: State) -> None:
         """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations."""
-        known = len([each for each in self.crossings(x) if np.abs(each.gap).max() > LOCATED])
-        if not (self.contradicts(x) if self.outcomes.size else self.switching(x).jumps.any()):
-            return
-        found = self._with_pieces(None).switching(x)
-        if found.jumps.sum() == known or (state.singular and not known):
-            return
-        other = self.mesh[[each.node for each in self.crossings(x)]] if known else np.array([np.inf])
-        at = int((np.abs(found.places[:, None] - other).min(axis=1) * found.jumps).argmax())
-        which = f"{found.names[at]}, where the equations jump"
-        raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
+        found = self.switching(x)
+        if self.outcomes.size and self.contradicts(x) and (why := clearance(self, x))[0] < 0:
+            raise Grazing(f"met grazing: {why[1]}")
+        if not self.outcomes.size and found.jumps.any() and not state.singular:
+            at = int(np.argmax(found.jumps))
+            which = f"{found.names[at]}, where the equations jump"
+            raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
 
     def stepped(self, x: Array, change: Array) -> tuple[Self, Array]:
         """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""
@@ -749,6 +757,15 @@ class Collocation(Composed):
     def referring_to(self, x: Array, tangent: Array) -> Self:
         """Return the same with a solution as the reference, where the kind has one."""
         return self.with_reference(x)
+
+    def explained(self, stop: Stop, trial: Trial) -> Stop:
+        """Return the end of a run at a jump, with the conditions and times."""
+        if not self.outcomes.size or stop.event not in ("grazing", "sliding"):
+            return stop
+        found, why = crossing_places(self, trial.x), clearance(self, trial.x)
+        jumps = ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
+        text = why[1] if abs(why[0]) < APART and stop.event == "grazing" else f"jumps at {jumps}"
+        return replace(stop, message=f"{stop.message}: {text}")
 
     def events(self) -> list[Event]:
         """Return those of the statement and, where the equations jump, of crossings that end."""

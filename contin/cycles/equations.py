@@ -627,7 +627,7 @@ class CycleCollocation(PeriodicCollocation):
 
     def explained(self, stop: Stop, trial: Trial) -> Stop:
         """Return the end where the period runs away with the equilibrium, and with the limit of the parameter."""
-        return explained(self, stop, trial.x)
+        return explained(self, super().explained(stop, trial), trial.x)
 
     def lasting(self, x: Array) -> Array:
         """Return free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""

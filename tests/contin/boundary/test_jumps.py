@@ -156,8 +156,8 @@ def test_a_threshold_that_is_touched_is_located():
         first, there = math.sqrt(2 * (0.3 * q + 0.06)), math.sqrt(0.4 * (q + 0.3))
         return (first - there) / q + math.sqrt(0.4 / (q + 0.3)) - 0.5
 
-    assert branch[-1].label == "GR" and "0.3 - u, where the equations jump" in branch.stop.message
-    assert abs(branch[-1]["q"] - brentq(excess, 1, 3)) < 1e-4
+    assert branch[-1].label == "GR" and "u.u > 0.3" in branch.stop.message
+    assert abs(branch[-1]["q"] - brentq(excess, 1, 3, xtol=1e-14)) < 1e-10
 
 
 def test_corners_may_come_and_go():
@@ -179,3 +179,18 @@ def test_a_sliding_solution_is_told():
     )
     with pytest.raises(contin.ConvergenceError, match="u.u > 0.2.* at t = .*the fields on both sides point there"):
         contin.solve(problem, lambda t: (0.5 * t,))
+
+
+def test_friction_that_begins_to_stick():
+    """x'' + x + F sign(x') = cos(1.3 t) sticks at the turning points where w^2 X = F, X the amplitude (Den Hartog 1930)."""
+    w = 1.3
+    part = math.sin(math.pi / w) / (w * (1 + math.cos(math.pi / w)))
+    sticks = w**2 / (w**2 - 1) / math.sqrt(1 + w**4 * part**2)
+    problem = contin.CycleProblem(
+        lambda t, u, p: (u.v, -u.x - p.F * np.sign(u.v) + np.cos(w * t)), ["x", "v"], {"F": 0.3}, period=lambda p: 2 * np.pi / w
+    )
+    start = contin.solve(problem, lambda t: (-1.2 * np.cos(2 * np.pi * t), 1.6 * np.sin(2 * np.pi * t)))
+    end = contin.trace(start, free=["F"], limits={"F": (0.1, 3)})[-1]
+    assert end.label == "SL" and abs(end["F"] - sticks) <= end.errors["F"] + 1e-12
+    assert abs(end["max_x"] - math.sqrt(1 / (1 - w**2) ** 2 - (end["F"] * part) ** 2)) < 1e-10
+    assert abs(np.exp(end.system.eigenvalues(end.x))).min() < 1e-10  # what has stuck forgets where it was
