@@ -16,6 +16,7 @@ parameters, tangents and multipliers are those of the solution with its jumps.
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
