@@ -71,7 +71,9 @@ class ConvergenceError(ContinError, ArithmeticError):
 
 
 class Grazing(ConvergenceError):
-    """A step has come to a solution that crosses more or fewer jumps of the equations."""
+    """A step has come to a solution that crosses more or fewer jumps; ``at_end``: its first or last piece vanishes."""
+
+    at_end = False
 
 
 def warn(text: str, category: type[Warning]) -> None:

@@ -147,7 +147,9 @@ def next_places(system: Any, x: Array) -> Array:
     if lost.any():
         at = int(np.argmax(lost))
         which = checks.listed(dict.fromkeys(found.names[max(at - 1, 0) : at + 1]))
-        raise Grazing(f"met grazing: {which}, the piece between jumps at t = {ends[at]:.6g} and {ends[at + 1]:.6g} vanishes")
+        error = Grazing(f"met grazing: {which}, the piece between jumps at t = {ends[at]:.6g} and {ends[at + 1]:.6g} vanishes")
+        error.at_end = at in (0, len(found.places))
+        raise error
     return found.places
 
 
@@ -180,6 +182,8 @@ def clearance(system: Any, x: Array) -> tuple[float, str]:
 
     It is positive on the side whose outcome is frozen. At corners the right sides differ in proportion to the number.
     """
+    if not system.outcomes.size:
+        return 1.0, ""
     batch, t, p = system.problem.batch("field"), system.gauss_times, system.all_parameters(x)
     every, sides, best = range(p.size), system.outcomes.repeat(system.degree, axis=0), (1.0, "")
 

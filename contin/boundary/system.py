@@ -42,7 +42,7 @@ from contin.errors import Grazing, ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
-from contin.levels import APART, CORRECTED
+from contin.levels import APART, CORRECTED, LOCATED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
 from contin.linalg.border import random_rows
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
@@ -116,6 +116,8 @@ class Collocation(Composed):
     _pieces: tuple[Array, Array] | None = None
     #: Those of the solution at which functions were evaluated last: derivatives by points become derivatives by x with them.
     _last_crossings: Sequence[Crossing] = ()
+    #: Jumps that a step crosses with outcomes that are not frozen, because one of them passes an end of the period; else 0.
+    _round: int = 0
 
     def __init__(
         self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
@@ -308,7 +310,7 @@ class Collocation(Composed):
         other = self._copied()
         for name in (*_ON_A_MESH, "_layout", "_columns", "_components", "outcomes"):
             vars(other).pop(name, None)
-        other._pieces = pieces
+        other._pieces, other._round = pieces, 0
         if pieces is not None:
             other.outcomes = pieces[1][np.searchsorted(pieces[0], (self.mesh[1:] + self.mesh[:-1]) / 2)]
         return other
@@ -328,15 +330,26 @@ class Collocation(Composed):
             return system, x
         return system._with_pieces((system.mesh[changes], sides[[0, *changes]])), x
 
-    def check_jumps(self, x: Array, state: State) -> None:
-        """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations."""
+    def check_jumps(self, x: Array, state: State, settled: bool = True) -> None:
+        """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations.
+
+        It is ``settled`` where mesh points have moved to the crossings; if they are late, Newton's method failed meanwhile.
+        """
+        if settled and any(np.abs(each.shift).max() > APART for each in self.crossings(x)):
+            raise Grazing("met grazing: no solution with these jumps is found there")
         found = self.switching(x)
+        if self._round and found.jumps.sum() != self._round:
+            raise Grazing("met grazing: a piece between jumps of the equations vanishes")
         if self.outcomes.size and self.contradicts(x) and (why := clearance(self, x))[0] < 0:
             raise Grazing(f"met grazing: {why[1]}")
-        if not self.outcomes.size and found.jumps.any() and not state.singular:
+        if not (self.outcomes.size or self._round or state.singular) and found.jumps.any():
             at = int(np.argmax(found.jumps))
             which = f"{found.names[at]}, where the equations jump"
             raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
+
+    def _jumps(self, x: Array) -> int:
+        """Return the number of jumps that a solution crosses, without those that do not matter."""
+        return len([each for each in self.crossings(x) if np.abs(each.gap).max() > LOCATED])
 
     def stepped(self, x: Array, change: Array) -> tuple[Self, Array]:
         """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""

@@ -12,6 +12,7 @@ not its kind.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Callable, Iterator
 
@@ -28,7 +29,7 @@ from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
-from contin.core.step import Reason, State, Stop
+from contin.core.step import Reason, State, Stop, corrected, settled
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError, Grazing
 from contin.events.arc import Arc, SpecialPoint, with_details
@@ -332,12 +333,35 @@ class Continuation:
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
+                if isinstance(error, Grazing) and self._went_round(step, error):
+                    state, (step, made) = self.state, (length_of(self.state, settings), None)
+                    continue
                 home: SpecialPoint | None = state.system.home_ahead(state, step)
                 if home is not None and all(test.function(home.trial) <= 0 for test in self._limits):
                     return home
             step, made = step / 2, None
             if step < settings.min_step:
                 raise problem
+
+    def _went_round(self, step: float, error: Grazing) -> bool:
+        """Go on where a jump of the equations passes an end of the period in a step; return whether one did.
+
+        No point is made. The step is made with outcomes that are not frozen, and frozen ones are found at its end.
+        """
+        state, newton = self.state, self.settings.newton
+        other = state.system.round_end(state.x, error)
+        if other is None:
+            return False
+        state = dataclasses.replace(state, system=other)
+        with contextlib.suppress(ConvergenceError):
+            trial = corrected(state, predict(state, step, self.settings), step, newton)
+            end = settled(trial, state.tangent, newton).settled
+            end.system.check_jumps(end.x, state)
+            system, x = end.system.crossed(end.x)
+            behind = on_branch(system, x, self.state.system.carrier(system)(state.tangent), self.settings, False)
+            kept = {name: getattr(state, name) for name in ("step", "accepted", "sense", "sensed")}
+            return self.go_on((dataclasses.replace(behind, arclength=state.arclength + step, **kept), None))
+        return False
 
     # --- results -------------------------------------------------------------------------------------------------
 

@@ -277,7 +277,7 @@ class Discretization(Equations, Protocol):
         """Return the same with frozen outcomes where the solution x crosses jumps of the equations, and x."""
         return self, x
 
-    def check_jumps(self, x: Array, state: Any) -> None:
+    def check_jumps(self, x: Array, state: Any, settled: bool = True) -> None:
         """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations."""
         return
 
@@ -289,6 +289,10 @@ class Discretization(Equations, Protocol):
     @property
     def small_equations(self) -> Any:
         """The `Batch` of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
+        return None
+
+    def round_end(self, x: Array, error: Exception) -> Any:
+        """Return the system for a step in which a jump of the equations passes an end of the period, or None."""
         return None
 
     def home_ahead(self, state: Any, step: float) -> Any:

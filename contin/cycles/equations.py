@@ -358,6 +358,15 @@ class PeriodicCollocation(OfCycles, Collocation):
             return None
         return at_special_point(self, point)
 
+    def round_end(self, x: Array, error: Any) -> Self | None:
+        """Return the system for a short step in which a crossing leaves at an end of the period and comes in at the other."""
+        places, (first, last) = [self.mesh[each.node] for each in self.crossings(x)], self.mesh[[0, -1]]
+        if not error.at_end or min(places[0] - first, last - places[-1]) > ROUGH * (last - first):
+            return None
+        other = self._with_pieces(None)
+        other._round = self._jumps(x)
+        return other
+
 
 class ForcedCollocation(PeriodicCollocation):
     """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.

@@ -194,3 +194,21 @@ def test_friction_that_begins_to_stick():
     assert end.label == "SL" and abs(end["F"] - sticks) <= end.errors["F"] + 1e-12
     assert abs(end["max_x"] - math.sqrt(1 / (1 - w**2) ** 2 - (end["F"] * part) ** 2)) < 1e-10
     assert abs(np.exp(end.system.eigenvalues(end.x))).min() < 1e-10  # what has stuck forgets where it was
+
+
+def test_a_jump_that_passes_the_end_of_the_period():
+    """Dry friction on a belt: from v0 = .2 to .9563 the second jump comes to the end of the period of the forcing.
+
+    Behind it it is the first one of the next period. The run ends where the mass would stick: the velocity is that of the belt
+    and the forces but friction are as large as friction, .3, in the direction of the motion behind it.
+    """
+
+    def belt(t, u, p):
+        return u.v, -u.x - 0.3 * np.sign(u.v - p.v0) - 0.05 * u.v + 1.5 * math.cos(1.3 * t)
+
+    problem = contin.CycleProblem(belt, ["x", "v"], {"v0": 0.8}, period=2 * math.pi / 1.3)
+    branch = contin.trace(contin.cycle(problem, [0.1, 0.0]), free=["v0"], limits={"v0": (0.8, 4)})
+    end = branch[-1]
+    assert [point.label for point in branch if point.label] == ["EP", "SL"] and end["v0"] > 2.5
+    sticking = [each for each in end.system.crossings(end.x) if abs(min(each.rates)) < 1e-6]
+    assert len(sticking) == 1
