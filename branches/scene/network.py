@@ -137,6 +137,9 @@ class NetworkStageConfig(FollowConfig):
     """A stage of a network; from there on, joints may be held otherwise."""
 
     held: dict[str, EndWords] = Field(default_factory=dict, description="what is held at joints from here on (as before)")
+    joints: dict[str, Literal["rigid", "hinge", "ball"]] = Field(
+        default_factory=dict, description="kinds of joints from here on (as before); a hinge is about the axis of the joint"
+    )
     phase: int | None = Field(
         None, ge=1, le=20, description="of a loop that floats: hold the sine of so many waves, so that it cannot shift",
     )  # fmt: skip
@@ -165,7 +168,7 @@ class NetworkScene(StagedScene):
         ("stages", "#", "to"), ("stages", "#", "numbers", "*"),
     )  # fmt: skip
 
-    SUPPORTS: ClassVar[str] = "held"
+    SUPPORTS: ClassVar[str] = "held, joints"
 
     title: str = ""
     material: Material | None = Field(None, description="law, and its numbers, of all strips")
@@ -202,8 +205,8 @@ class NetworkScene(StagedScene):
                     raise ValueError(f"{name!r} is not usable as a name (letters, digits and _, from a letter on)")
         if (self.material is None) == (not self.sections):
             raise ValueError("material, sections: give one of them")
-        if self.stages[0].held or self.stages[0].numbers:
-            raise ValueError("stage 1: held, numbers: those of the scene are the first stage's")
+        if self.stages[0].held or self.stages[0].joints or self.stages[0].numbers:
+            raise ValueError("stage 1: held, joints, numbers: those of the scene are the first stage's")
         self.check_stages()
         networks = [self.strip(number) for number in range(1, len(self.stages) + 1)]
         names = [*({name for network in networks for name in network.parameters}), *self.found_names, *OWN]
@@ -225,19 +228,21 @@ class NetworkScene(StagedScene):
     def _kinds(self) -> dict[str, str]:
         return {name: kind for number in range(1, len(self.stages) + 1) for name, kind in self.strip(number).kinds.items()}
 
-    def _held(self, stage: int) -> tuple[int | None, dict[str, End], tuple[str, ...]]:
-        """Return the phase and what is held in a stage, and the joints at which that has changed since the first one."""
+    def _held(self, stage: int) -> tuple[int | None, dict[str, End], dict[str, str], tuple[str, ...]]:
+        """Return the phase, what is held and kinds of joints in a stage, and the joints whose support has changed since."""
         one = self.stages[stage - 1]
         if stage == 1:
-            return one.phase, {name: end.end(self.axes_at(name)) for name, end in self.held.items()}, ()
-        _, held, changed = self._held(one.stage or stage - 1)
+            return one.phase, {name: end.end(self.axes_at(name)) for name, end in self.held.items()}, {}, ()
+        _, held, kinds, changed = self._held(one.stage or stage - 1)
         held = held | {name: end.end(self.axes_at(name)) for name, end in one.held.items()}
         held = {name: end for name, end in held.items() if end != FREE_END}
-        return one.phase, held, tuple(dict.fromkeys((*changed, *one.held)))
+        return one.phase, held, kinds | one.joints, tuple(dict.fromkeys((*changed, *one.held)))
 
-    def _strip_with(self, waves: int | None, held: dict[str, End], changed: tuple[str, ...]) -> Network:
+    def _strip_with(
+        self, waves: int | None, held: dict[str, End], kinds: dict[str, str], changed: tuple[str, ...]
+    ) -> Network:  # fmt: skip
         """Return the network with the states of the phases of all stages, of which one holds."""
-        network = self._network(held, changed)
+        network = self._network(held, changed, kinds)
         known = list(dict.fromkeys(stage.phase for stage in self.stages if stage.phase is not None))
         if known and not network.floats:
             raise ValueError("stages: phase: a network that is held does not shift; leave it out, or hold nothing")
@@ -279,10 +284,13 @@ class NetworkScene(StagedScene):
             raise ConfigError(f"strips: no first state was found from the drawing: {error}{units}") from error
 
     def replacing(self, stage: int) -> tuple[str, ...]:
-        _, held, changed = self._held(stage)
+        _, held, _, changed = self._held(stage)
         return tuple(number for name in changed for number in replacing(name, held.get(name)))
 
-    def _network(self, held: dict[str, End], changed: tuple[str, ...]) -> Network:
+    def _network(self, held: dict[str, End], changed: tuple[str, ...], kinds: dict[str, str]) -> Network:
+        for name in kinds:
+            if name not in self.joints:
+                raise ValueError(f"joints: {one_of(name, self.joints)}")
         sections = self._sections()
         members, joints = dict(self._drawn), {}
         cuts: dict[str, list[float]] = {}
@@ -299,13 +307,15 @@ class NetworkScene(StagedScene):
                 members.update(zip(pieces[name], member.cut(parts)))
         for name, joint in self.joints.items():
             axes, arms = self.axes_at(name), {place: _over(arm, self.size("length")) for place, arm in joint.arm.items()}
-            about, hinge = axes.get(joint.about, joint.about), axes.get(joint.hinge, joint.hinge or axes["width"])
+            about = axes.get(joint.about, joint.about)
+            hinge = axes.get(joint.hinge, joint.hinge or about)
+            kind = kinds.get(name, BALL if joint.ball else RIGID if joint.hinge is None else HINGE)
             ends = [
                 JointEnd(piece, end, joint.angle.get(place, 0.0), about, arms.get(place, (0.0, 0.0, 0.0)), goes_on)
                 for place in joint.strips
                 for piece, end, goes_on in _ends_at(*_parsed(f"joints: {name}", place, self.strips), cuts, pieces)
             ]
-            joints[name] = Joint(ends, BALL if joint.ball else RIGID if joint.hinge is None else HINGE, hinge)
+            joints[name] = Joint(ends, kind, hinge)
         loads = {number: self._load(number, actions, joints, cuts, pieces) for number, actions in self.loads.items()}
         for name in changed:
             if name not in joints:

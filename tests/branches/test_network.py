@@ -379,13 +379,15 @@ MISTAKES = {
     "held: {A: {rotaton: clamped}}": "unknown field 'held.A.rotaton' (did you mean 'rotation'?); the fields are rotation,",
     "loads: {P: {tipp: [0, 0, 1]}}": "loads: P: 'tipp' (did you mean 'tip'?) must be a joint, or a strip",
     "strips: {a: {begin: [0, 0, 0], end: [0, 0, 1], normal: x, copies: 1 about z}}": "a: copies: '1 about z' must be a number",
+    "stages: [{follow: P, to: 1.0}, {follow: P, to: 2.0, joints: {ct: ball}}]": "joints: 'ct' (did you mean 'cut'?)",
+    "stages: [{follow: P, to: 1.0}, {follow: P, to: 2.0, joints: {cut: hinged}}]": "must be 'rigid', 'hinge' or 'ball', not",
     "held: {A: welded}": "held.A: 'welded' must be clamped, hinged, ball joint, free",
     "loads: {P: {tip: {moment: 1.0}}}": "loads: P: moments: tip must be held by a hinge",
     "loads: {P: {tip: {force: [0, 0, 1], moment: 1.0}}}": "loads.P.tip: force, moment: give one of them",
     "material: {B1: 1.0}": "material: the field 'law' is missing",
     "material: {law: rubber}": "material: law: 'rubber' must be one of",
     "stages: [{follow: Q, to: 1.0}]": "stage 1: follow: 'Q' must be one of the numbers here",
-    "stages: [{follow: P, to: 1.0, held: {A: free}}]": "stage 1: held, numbers: those of the scene are the first stage's",
+    "stages: [{follow: P, to: 1.0, held: {A: free}}]": "stage 1: held, joints, numbers: those of the scene are the",
     "stages: [{follow: P, to: 1.0}, {follow: P, to: 2.0, held: {Z: free}}]": "stage 2: held: 'Z' must be one of A, cut, tip",
     "stages: [{follow: P, to: 1.0, limits: {tip_w: [0, 1]}}]": "stage 1: 'tip_w'",
     "loads: {weight: {tip: [0, 0, -1]}}": "loads: weight: is the name of another number of this network; give another name",
@@ -453,6 +455,36 @@ def test_places_and_reactions_are_labelled_and_limited(run):
 
 
 # --- supports that change -----------------------------------------------------------------------------------------------
+
+
+def test_a_joint_that_becomes_a_hinge(run):
+    """A propped cantilever with a hinge: tan ka = k (a + b) for a clamped part a and a link b (their moments balance)."""
+    held = "held: {A: clamped, tip: {rotation: hinged, about: width, slides_along: tangent}}"
+    stages = "{follow: P, to: 5}\n  - {follow: P, to: 12, joints: {cut: hinge}}\n  - {follow: P, to: 13, joints: {cut: rigid}}"
+    branch = run(CANTILEVER.replace("held: {A: clamped}", held).replace("{follow: P, to: 3.0}", stages))
+    (first, *_) = (event for event in branch.events if event["label"] == b"BP")
+    k = brentq(lambda k: math.tan(0.4 * k) - k, 2.5, 3.9)
+    assert (first["stage"], first["index_before"], first["index_after"]) == (2, 0, 1)
+    assert first["P"] == pytest.approx(k * k, abs=1e-9)
+    assert branch.points["index"][-1] == 0  # rigid again at P = 13 < 20.19
+
+
+@pytest.mark.parametrize(
+    ("kind", "then", "said"),
+    [
+        ("[a finish, b start]", "ball", "stage 2: held, joints: the supports let go of what no load replaces"),
+        ("{strips: [a finish, b start], hinge: [1, 0, 0]}", "rigid", "stage 2: held, joints: they hold a place or a rotation"),
+    ],
+)
+def test_a_joint_lets_go_of_no_moment_and_turns_nothing(kind, then, said, tmp_path):
+    """A bent beam carries a moment at its joint; a hinge that has turned is not rigid as it was drawn."""
+    bent = CANTILEVER.replace("tip: [0, 0, -1]", "cut: [0, 1, 0]").replace("[a finish, b start]", kind)
+    held = "held: {A: clamped, tip: {rotation: hinged, about: [1, 0, 0], slides_along: [0, 0, 1]}}"
+    stages = f"{{follow: P, to: 1}}\n  - {{follow: P, to: 2, joints: {{cut: {then}}}}}"
+    text = bent.replace("held: {A: clamped}", held).replace("{follow: P, to: 3.0}", stages)
+    assert run_scene(parse(text, "scene.yaml"), tmp_path / "x.h5", Display(silent=True)) == "lost"
+    assert read_branch(tmp_path / "x.h5").stop.startswith(said)
+
 
 _CHANGES = [  # of an open strip: what is followed, to which value, what is held; of the network of one strip
     ("force_normal", -2.0, None, "P", None),
@@ -560,7 +592,7 @@ def test_reactions_that_no_load_replaces_are_told(tmp_path):
     text += "  - {follow: P, to: 2.0, held: {A: ball joint, tip: clamped}}\n"
     path = tmp_path / "result.h5"
     assert run_scene(parse(text, "scene.yaml"), path, Display(silent=True)) == "lost"
-    assert read_branch(path).stop.startswith("stage 2: held: the supports let go of what no load replaces")
+    assert read_branch(path).stop.startswith("stage 2: held, joints: the supports let go of what no load replaces")
 
 
 # --- barriers and snaps -------------------------------------------------------------------------------------------------
