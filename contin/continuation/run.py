@@ -106,7 +106,7 @@ class Continuation:
         if state is None:
             self._notes.check_phases(self.here())
         self._handed: Handed | None = None  # the next step, where a kernel has made it
-        self._left: list[Array] = []  # corners, each with the tangent of the way on
+        self._left: list[tuple[float, Array]] = []  # corners: the arclength, and the place with the tangent of the way on
         self._adapted = -1  # regular points at which the mesh was looked at last
         self._lanes = Lanes(self.start, self._tests, [*self._conditions, *self._own])
 
@@ -239,7 +239,8 @@ class Continuation:
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
-        corner = next((point.at for point in found if point.test in self._conditions), np.inf)  # it tells of branches, too
+        last = self._left[-1][0] - arc.state.arclength if self._left else -np.inf  # a corner tells of branches there, too
+        corner = next((point.at for point in found if point.test in self._conditions), last)
         found = [point for point in found if point.label != Label.BRANCH_POINT or abs(point.at - corner) > APART * arc.step]
         changes = index_changes(self._watch.index, arc, found, self._notes)
         if end == len(special):
@@ -288,11 +289,11 @@ class Continuation:
             length, step = state.arclength + at.at, min(state.step, settings.step) if corner else state.step
             self.go_on((dataclasses.replace(behind, arclength=length, step=step, accepted=accepted), None))
             left = np.concatenate([at.trial.x, ways[0].tangent])
-            if any(np.abs(left - known).max() < APART for known in self._left if known.size == left.size):
+            if any(np.abs(left - known).max() < APART for _, known in self._left if known.size == left.size):
                 self.stop = Stop(Reason.KNOWN_BRANCH, "the run comes back to a corner, and the way on is known")
             elif accepted >= settings.max_points:
                 self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[0])
-            self._left.append(left)
+            self._left.append((length, left))
 
     def _index_across(self, corner: SpecialPoint, ways: list[Way]) -> IndexChange | None:
         """Return the index before and behind a corner: what contacts hold does not move."""

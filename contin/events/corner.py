@@ -147,10 +147,7 @@ def _inside(before: Trial, trial: Trial) -> list[Trial]:
 
 
 def _level(slopes: Array, x: Array, part: float, least: float | None = None) -> Any:
-    """Return by how much numbers change where the unknowns change by a ``part`` of 1 + their size; or, below 1, by ``least``.
-
-    A gap in metres less a force in kilonewtons has slopes of very different sizes.
-    """
+    """Return by how much numbers change where the unknowns change by a ``part`` of their size, and by ``least`` (the same)."""
     return np.abs(slopes) @ (part * np.abs(x) + (part if least is None else least)) + TINY
 
 
