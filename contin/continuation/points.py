@@ -14,6 +14,7 @@ from contin.core.settings import Settings
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import Arc, SpecialPoint
+from contin.events.corner import zeros
 from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import refined
@@ -67,6 +68,7 @@ class Notes:
         if known := getattr(trial.system.problem, "contacts", None):
             held = trial.system.problem.touching(trial.system, trial.x)
             states = [f"{name} {'holds' if name in held else 'is open'}" for name in known.values()]
+            states += [f"{trial.system.written(k, 1.0)} without force" for k in zeros(trial.system, trial.x)]
             self.add(f"contacts at {self.place(trial)}: {', '.join(states)}")
 
     def corners(self, trial: Trial) -> None:

@@ -67,6 +67,15 @@ def test_a_point_in_the_place_of_a_wall():
     assert trace(again, free=["P"], limits={"P": (1, 30)}).labelled("LP")[0]["P"] == pytest.approx(fold["P"], rel=1e-11)
 
 
+def test_a_wall_that_is_touched_without_force_counts_as_one_that_holds_and_a_run_says_so():
+    """The straight column buckles as one that is held in its middle: tan k = k, P = k^2."""
+    problem = half_column(ends=lambda a, b, p: (a.y, b.th, -b.y), pushes={2: "wall"})
+    branch = trace(solve(problem, [0.0, 0.0]), free=["P"], limits={"P": (1, 30)})
+    assert branch.notes == ["contacts at P = 2: wall holds, wall touches without force"]
+    k = brentq(lambda k: math.sin(k) - k * math.cos(k), 4, 4.7)
+    assert branch.labelled("BP")[0]["P"] == pytest.approx(k**2, rel=1e-11)
+
+
 @pytest.mark.parametrize(["way", "name", "depth"], [(-1, "upper", 0.2), (1, "lower", 0.3)])
 def test_walls_on_both_sides_at_the_first_end(way, name, depth):
     problem = half_column(ends=lambda a, b, p: (b.y, a.th, 0.2 - a.y, a.y + 0.3), pushes={2: "upper", 3: "lower"})
