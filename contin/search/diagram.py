@@ -236,6 +236,8 @@ class _Explorer:
         a, b = known.system, point.system
         carry, there = b.carrier(a), seen(a, known.x)
         here, ahead = seen(a, carry(point.x)), seen(a, carry(finding_of(point.details).leaving[0]))
+        if here.size != there.size:  # cycles of a map, of different lengths
+            return None
         parameters = slice(a.state_size, None)
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None

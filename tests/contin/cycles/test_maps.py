@@ -244,3 +244,12 @@ def test_a_curve_of_tori_of_a_map_passes_strong_resonances(tmp_path):
     assert again.column("angle").tolist() == found.column("angle").tolist()
     onward = contin.trace(again.points[1], limits={"e": (-1, 0.6)})  # of the same kind of curve
     assert [point.label for point in onward if point.label][-2:] == ["R4", "EP"]
+
+
+def test_a_diagram_keeps_branch_points_of_fixed_points_and_of_cycles_apart():
+    """x' = x^3 - r x: branch points of x = 0 at r = -1, and of the cycle x^2 = r - 1 that begins at r = 1, at r = 2."""
+    problem = contin.MapProblem(lambda u, p: (u.x**3 - p.r * u.x,), ["x"], {"r": 0.0})
+    found = contin.diagram(contin.solve(problem, [0.0]), free=["r"], limits={"r": (-1.5, 2.2), "x": (-5, 5)}, depth=2)
+    points = sorted((junction.point["r"], junction.point.label) for junction in found.junctions)
+    assert [label for _, label in points] == ["BP", "PD", "BP"]
+    assert [value for value, _ in points] == pytest.approx([-1, 1, 2], abs=1e-9)
