@@ -17,7 +17,7 @@ from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.corner import changed_between
-from contin.levels import MOST_STEPS, ROUGH
+from contin.levels import CORRECTED, MOST_STEPS, ROUGH
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -175,16 +175,27 @@ def runs_away(now: Scales, then: Scales) -> bool:
     return bool(np.append(now.states / then.states, now.parameters / then.parameters).max() > _FAR)
 
 
+def _nears(trial: Trial, state: State, limits: tuple[float, float], primary: str) -> bool:
+    """Return whether the primary parameter goes to a limit, and not to zero or to a value before it as states grow."""
+    value, place = trial[primary], trial.system.parameter_index(primary)
+    size = trial.system.free_scales[place - trial.system.state_size]
+    gone = state.tangent[place] * size * state.previous_step
+    return abs(gone) > CORRECTED * abs(value) and (limits[int(gone > 0)] * value > 0 or abs(value) > ROUGH * size)
+
+
 def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: Discretization) -> Stop | None:
     """Return why a run ends after a step: it has as many points as it may have, goes to infinity, or stands still."""
     if state.accepted >= settings.max_points:
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
-    if primary not in settings.limits and runs_away(trial.system.solution.scales, start.solution.scales):
+    limits = settings.limits.get(primary)
+    far = runs_away(trial.system.solution.scales, start.solution.scales)
+    if far and not (limits and _nears(trial, state, limits, primary)):
         names = (*(name for name in trial.system.free), "the largest state")
         sizes = (*(trial[name] for name in trial.system.free), np.abs(trial.system.states(trial.x)).max(initial=0.0))
         place = ", ".join(f"{name} = {size:.3g}" for name, size in zip(names, sizes))
         return Stop(
-            Reason.INFINITY, f"the branch goes to infinity: {place}", f"limits of {primary} end it earlier, or let it go on"
+            Reason.INFINITY, f"the branch goes to infinity: {place}",
+            f"it comes no nearer to a limit of {primary}" if limits else f"limits of {primary} end it earlier, or let it go on",
         )
     if not settings.folds or state.accepted != _STANDING or state.sense:
         return None

@@ -2,7 +2,7 @@
 
 import pytest
 
-from contin import AlgebraicProblem, solve, trace
+from contin import AlgebraicProblem, diagram, solve, trace
 
 BRANCHES = {"pole": lambda u, p: (u.x * p.a - 1,), "line": lambda u, p: (u.x - p.a,), "parabola": lambda u, p: (u.x**2 - p.a,)}
 
@@ -15,3 +15,15 @@ def test_a_branch_ends_where_it_goes_to_infinity(name):
     assert str(branch.stop).startswith("the branch goes to infinity: a = ")
     held = trace(start, free=["a"], direction=-1 if name == "pole" else 1, limits={"a": (1e-18, 1e18)})
     assert held.stop.reason == "limit"
+
+
+def test_limits_that_are_not_reached_end_no_run():
+    """x = 1 - 1/r leaves x = 0 at r = 1 and goes to minus infinity at r = 0; S = D/(1 - D) of a chemostat to infinity at D = 1."""
+    logistic = AlgebraicProblem(lambda u, p: (p.r * u.x * (1 - u.x) - u.x,), ["x"], {"r": 0.5})
+    found = diagram(solve(logistic, [0.0]), free=["r"], limits={"r": (0, 4)})
+    last = found.branches[-1]
+    assert last.stop.reason == "infinity" and len(last) < 100 and abs(last["r"] * (1 - last["x"]) - 1).max() < 1e-9
+    assert str(last.stop).endswith("it comes no nearer to a limit of r")
+    chemostat = AlgebraicProblem(lambda u, p: (u.S / (1 + u.S) - p.D,), ["S"], {"D": 0.5})
+    washed = trace(solve(chemostat, [1.0]), free=["D"], limits={"D": (0.2, 2)})
+    assert washed.stop.reason == "infinity" and len(washed) < 100 and abs(washed[-1]["D"] - 1) < 1e-12
