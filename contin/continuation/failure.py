@@ -194,7 +194,8 @@ def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: N
         sizes = (*(trial[name] for name in trial.system.free), np.abs(trial.system.states(trial.x)).max(initial=0.0))
         place = ", ".join(f"{name} = {size:.3g}" for name, size in zip(names, sizes))
         return Stop(
-            Reason.INFINITY, f"the branch goes to infinity: {place}",
+            Reason.INFINITY,
+            f"the branch goes to infinity: {place}",
             f"it comes no nearer to a limit of {primary}" if limits else f"limits of {primary} end it earlier, or let it go on",
         )
     if not settings.folds or state.accepted != _STANDING or state.sense:

@@ -18,7 +18,7 @@ def test_a_branch_ends_where_it_goes_to_infinity(name):
 
 
 def test_limits_that_are_not_reached_end_no_run():
-    """x = 1 - 1/r leaves x = 0 at r = 1 and goes to minus infinity at r = 0; S = D/(1 - D) of a chemostat to infinity at D = 1."""
+    """x = 1 - 1/r goes to minus infinity at r = 0, S = D/(1 - D) of a chemostat to infinity at D = 1."""
     logistic = AlgebraicProblem(lambda u, p: (p.r * u.x * (1 - u.x) - u.x,), ["x"], {"r": 0.5})
     found = diagram(solve(logistic, [0.0]), free=["r"], limits={"r": (0, 4)})
     last = found.branches[-1]

@@ -247,9 +247,10 @@ def test_a_curve_of_tori_of_a_map_passes_strong_resonances(tmp_path):
 
 
 def test_a_diagram_keeps_branch_points_of_fixed_points_and_of_cycles_apart():
-    """x' = x^3 - r x: branch points of x = 0 at r = -1, and of the cycle x^2 = r - 1 that begins at r = 1, at r = 2."""
-    problem = contin.MapProblem(lambda u, p: (u.x**3 - p.r * u.x,), ["x"], {"r": 0.0})
-    found = contin.diagram(contin.solve(problem, [0.0]), free=["r"], limits={"r": (-1.5, 2.2), "x": (-5, 5)}, depth=2)
-    points = sorted((junction.point["r"], junction.point.label) for junction in found.junctions)
-    assert [label for _, label in points] == ["BP", "PD", "BP"]
-    assert [value for value, _ in points] == pytest.approx([-1, 1, 2], abs=1e-9)
+    """With m = 16 r (r - 1), x = 0 doubles at m = -2, and the cycle x^2 = -2 - m has a branch point at m = -3; y at r = 1/2."""
+    problem = contin.MapProblem(
+        lambda u, p: (u.x * (1 + 16 * p.r * (p.r - 1) + u.x**2), u.y * (p.r + 0.5 - u.y**2)), ["x", "y"], {"r": 0.05}
+    )
+    found = contin.diagram(contin.solve(problem, [0.0, 0.0]), free=["r"], limits={"r": (-0.05, 0.6)}, depth=2)
+    points = {(junction.point.label, junction.point["rounds"], round(junction.point["r"], 6)) for junction in found.junctions}
+    assert points >= {("PD", 1, 0.146447), ("BP", 1, 0.0), ("BP", 1, 0.5), ("BP", 2, 0.25), ("BP", 2, 0.5)}
