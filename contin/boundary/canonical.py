@@ -316,12 +316,8 @@ def _pivots(second: Sequence[Sequence[Number]]) -> list[Number]:
 class EndConditions:
     """Conditions at the ends: operations on one tape, whose inputs are x and lambda at both ends, and all parameters.
 
-    Attributes
-    ----------
-    sigmas : int
-        Number of conditions that do more than fix one state.
-    fixed : tuple
-        As in `Canonical`.
+    - ``sigmas`` (int): Number of conditions that do more than fix one state.
+    - ``fixed`` (tuple): As in `Canonical`.
     """
 
     def __init__(self, variation: Variation) -> None:

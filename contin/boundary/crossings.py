@@ -43,18 +43,12 @@ _LATER = 1e-6
 class Crossing(NamedTuple):
     """A mesh point at which outcomes change.
 
-    Attributes
-    ----------
-    node : int
-        Number of the mesh point.
-    condition : int
-    delay : float
-    by_x : ndarray, shape (n + k,)
-        Derivatives of the delay by the states and the free parameters, scaled.
-    gap : ndarray, shape (n,)
-        f- - f+, scaled.
-    rates : tuple of float
-        g' before and behind, positive where g goes to the side behind.
+    - ``node`` (int): Number of the mesh point.
+    - ``condition`` (int)
+    - ``delay`` (float)
+    - ``by_x`` (ndarray, shape (n + k,)): Derivatives of the delay by the states and the free parameters, scaled.
+    - ``gap`` (ndarray, shape (n,)): f- - f+, scaled.
+    - ``rates`` (tuple of float): g' before and behind, positive where g goes to the side behind.
     """
 
     node: int

@@ -54,10 +54,8 @@ from contin.linalg.matrices import SparseFactors, nearest_of, rightmost_of
 class FieldForm(DenseForm):
     """That of a steady state of fields.
 
-    Parameters
-    ----------
-    system : Fields
-    x : ndarray, shape (size,)
+    - ``system`` (Fields)
+    - ``x`` (ndarray, shape (size,))
     """
 
     def __init__(self, system: Any, x: Array) -> None:

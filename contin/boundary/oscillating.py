@@ -48,14 +48,10 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
 
     Raises ProblemError where the field has integral conditions, or boundary conditions that fill an array.
 
-    Parameters
-    ----------
-    field : BoundaryValueProblem
-        With ``rates``.
-    phase : mapping of int to (callable, callable)
-        The real and imaginary part of the critical vector over the domain, of each state whose rate occurs.
-    times : int
-        Odd.
+    - ``field`` (BoundaryValueProblem): With ``rates``.
+    - ``phase`` (mapping of int to (callable, callable)): The real and imaginary part of the critical vector over the domain, of
+      each state whose rate occurs.
+    - ``times`` (int): Odd.
     """
     if field.integrals is not None or argument_count(field.boundary) != 3:
         raise ProblemError(

@@ -52,12 +52,9 @@ _POSITIVE = 0.1
 class SecondVariation:
     """The second variation at a stationary point, restricted to what the conditions allow.
 
-    Attributes
-    ----------
-    eigenvalues : ndarray
-        Of the reduced matrix, ascending, without positive ones that were eliminated. Their signs matter, and where they vanish.
-    known : float
-        Error of the state, relative to 1 + |x|.
+    - ``eigenvalues`` (ndarray): Of the reduced matrix, ascending, without positive ones that were eliminated. Their signs
+      matter, and where they vanish.
+    - ``known`` (float): Error of the state, relative to 1 + |x|.
     """
 
     eigenvalues: Array

@@ -225,20 +225,16 @@ def assemble(
     For node m and a Gauss point with weight w, A is ``h * value[m] * J``, S is ``slope[m]`` on the diagonal, and Q is the sum
     over the Gauss points of ``w * h * value[m] * J``. Places with a dot are left as they are: elimination does not read them.
 
-    Parameters
-    ----------
-    layout : Layout
-    tables : Tables
-    h : ndarray, shape (N,)
-    jacobian : ndarray, shape (N d, n + n_int, n + k)
-        Derivatives of rhs and integrands at the Gauss points, by the states in the layout's order and the free parameters.
-    at_ends : ndarray, shape (1, n_bc, 2 n + k)
-        Derivatives of the boundary conditions by the states, in their own order, at both ends and the free parameters.
-    around : Bordering
-    blocks : Blocks
-        Filled.
-    share : Share
-        The first stage fills the rows of intervals, the second one all other parts.
+    - ``layout`` (Layout)
+    - ``tables`` (Tables)
+    - ``h`` (ndarray, shape (N,))
+    - ``jacobian`` (ndarray, shape (N d, n + n_int, n + k)): Derivatives of rhs and integrands at the Gauss points, by the
+      states in the layout's order and the free parameters.
+    - ``at_ends`` (ndarray, shape (1, n_bc, 2 n + k)): Derivatives of the boundary conditions by the states, in their own order,
+      at both ends and the free parameters.
+    - ``around`` (Bordering)
+    - ``blocks`` (Blocks): Filled.
+    - ``share`` (Share): The first stage fills the rows of intervals, the second one all other parts.
     """
     collocation, columns = h.size * layout.rows.size, around.columns
     if share.stage != 1:

@@ -108,19 +108,14 @@ _Values = Callable[[Array, Array, Array], Array]
 class Selections:
     """Conditions of functions that states or free parameters decide.
 
-    Attributes
-    ----------
-    names : tuple of str
-        The number whose sign decides, as text.
-    sides : callable
-        ``sides(t, u, p)`` tells on which side of each switch points are, shape (points, selections): whole numbers, of other
-        sides others.
-    gaps : callable
-        ``gaps(t, u, p)`` returns the values with one outcome less those with the other, shape (points, gaps).
-    of_gaps : ndarray of int, shape (gaps, 2)
-        Number of the selection, and of the value of the functions, of each gap.
-    known : ndarray of bool, shape (selections,)
-        The other outcome has values to compare with; it has none at the knots of a table.
+    - ``names`` (tuple of str): The number whose sign decides, as text.
+    - ``sides`` (callable): ``sides(t, u, p)`` tells on which side of each switch points are, shape (points, selections): whole
+      numbers, of other sides others.
+    - ``gaps`` (callable): ``gaps(t, u, p)`` returns the values with one outcome less those with the other, shape (points,
+      gaps).
+    - ``of_gaps`` (ndarray of int, shape (gaps, 2)): Number of the selection, and of the value of the functions, of each gap.
+    - ``known`` (ndarray of bool, shape (selections,)): The other outcome has values to compare with; it has none at the knots
+      of a table.
     """
 
     names: tuple[str, ...]
@@ -243,15 +238,11 @@ _AT_ONCE, _JUMP = 1e-5, 1e-2
 class Switching(NamedTuple):
     """Places of a solution where its equations have corners or jumps, increasing.
 
-    Attributes
-    ----------
-    places : ndarray, shape (K,)
-    costs : ndarray, shape (K,)
-        The error that a switch inside an interval makes, relative to the sizes of the states.
-    jumps : ndarray of bool, shape (K,)
-        The equations jump: the derivatives do not tell how the solution moves with the place.
-    names : tuple of str
-        The numbers whose sign decides.
+    - ``places`` (ndarray, shape (K,))
+    - ``costs`` (ndarray, shape (K,)): The error that a switch inside an interval makes, relative to the sizes of the states.
+    - ``jumps`` (ndarray of bool, shape (K,)): The equations jump: the derivatives do not tell how the solution moves with the
+      place.
+    - ``names`` (tuple of str): The numbers whose sign decides.
     """
 
     places: Array

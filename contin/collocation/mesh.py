@@ -161,14 +161,10 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
     each component scaled by max(1, max |u|).
 
-    Parameters
-    ----------
-    basis : Basis
-    mesh : ndarray, shape (N + 1,)
-    states : ndarray, shape (N d + 1, n)
-        At the nodes.
-    breaks : ndarray, optional
-        Places where the equations have jumps or corners: differences across them are no errors.
+    - ``basis`` (Basis)
+    - ``mesh`` (ndarray, shape (N + 1,))
+    - ``states`` (ndarray, shape (N d + 1, n)): At the nodes.
+    - ``breaks`` (ndarray, optional): Places where the equations have jumps or corners: differences across them are no errors.
     """
     d, h = basis.degree, mesh[1:] - mesh[:-1]
     if h.size < 2:

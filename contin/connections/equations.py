@@ -61,10 +61,8 @@ class ConnectionCollocation(Collocation):
         [ A    b ] [ y ]   [ 0 ]
         [ c^T  0 ] [ g ] = [ 1 ],        which makes g zero where A is singular.
 
-    Attributes
-    ----------
-    reference : ndarray, shape (size,)
-        The vector of unknowns at which v and Q were taken; empty where `with_reference` was not called.
+    - ``reference`` (ndarray, shape (size,)): The vector of unknowns at which v and Q were taken; empty where `with_reference`
+      was not called.
     """
 
     problem: Any

@@ -53,12 +53,8 @@ def lane_of(
 ) -> Lane | None:  # fmt: skip
     """Return the lane of a run; None where every step must be made one by one.
 
-    Parameters
-    ----------
-    tests, own : sequence of Event
-        All of the run, and those among them that the kind of problem brings.
-    noisy : bool
-        Round-off of Newton's method was noted.
+    - ``tests``, ``own`` (sequence of Event): All of the run, and those among them that the kind of problem brings.
+    - ``noisy`` (bool): Round-off of Newton's method was noted.
     """
     known: Any = system
     kind = SmallLane if equations_of(system) is not None else MeshLane if _is_smooth(known) else None
@@ -85,15 +81,11 @@ def _quotient(size: int) -> Quotient:
 class Lane(ABC):
     """Plain steps of one system, with what a kernel works in.
 
-    Parameters
-    ----------
-    system : Discretization
-    settings : Settings
-    start : tuple (system, x, tangent)
-        The first point of the run.
-    tests, others : sequence of Event
-        All, and those that the kernel does not know.
-    noisy : bool
+    - ``system`` (Discretization)
+    - ``settings`` (Settings)
+    - ``start`` (tuple (system, x, tangent)): The first point of the run.
+    - ``tests``, ``others`` (sequence of Event): All, and those that the kernel does not know.
+    - ``noisy`` (bool)
     """
 
     def __init__(
@@ -322,10 +314,7 @@ class MeshLane(Lane):
 class Lanes:
     """The lane of a run, made anew where what it depends on has changed.
 
-    Parameters
-    ----------
-    start, tests, own
-        As in `lane_of`.
+    - ``start``, ``tests``, ``own``: As in `lane_of`.
     """
 
     def __init__(self, start: Start, tests: Sequence[Event], own: Sequence[Event]) -> None:
@@ -348,12 +337,9 @@ class Lanes:
 class Block:
     """Plain steps that one call has made.
 
-    Attributes
-    ----------
-    made : int
-        How many.
-    handed : tuple (float, Trial, Trial) or None
-        The step behind them, where a kernel has made it and it asks for a closer look: its length, its beginning and its end.
+    - ``made`` (int): How many.
+    - ``handed`` (tuple (float, Trial, Trial) or None): The step behind them, where a kernel has made it and it asks for a
+      closer look: its length, its beginning and its end.
     """
 
     def __init__(self, system: Any, base: State, path: rules.Path, made: _Made, handed: Handed | None) -> None:

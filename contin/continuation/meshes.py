@@ -144,12 +144,8 @@ class Place(Protocol):
 class MeshPolicy:
     """When a run changes its mesh, and whether it goes on from there.
 
-    Attributes
-    ----------
-    steps : Steps
-        How the steps of the run are made, with its settings.
-    tests : sequence of Event
-        Those that have the same sign on every mesh.
+    - ``steps`` (Steps): How the steps of the run are made, with its settings.
+    - ``tests`` (sequence of Event): Those that have the same sign on every mesh.
     """
 
     steps: Steps

@@ -25,17 +25,11 @@ from contin.results.point import Point
 class Notes:
     """The sentences about a run.
 
-    Attributes
-    ----------
-    texts : list of str
-    primary : str
-        Places are told by this parameter.
-    tolerance : float
-        Of the mesh.
-    moves : bool
-        Mesh points follow corners.
-    is_noisy : bool
-        Some point is not known to the tolerance of Newton's method.
+    - ``texts`` (list of str)
+    - ``primary`` (str): Places are told by this parameter.
+    - ``tolerance`` (float): Of the mesh.
+    - ``moves`` (bool): Mesh points follow corners.
+    - ``is_noisy`` (bool): Some point is not known to the tolerance of Newton's method.
     """
 
     def __init__(self, primary: str, tolerance: float, moves: bool) -> None:

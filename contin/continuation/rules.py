@@ -120,20 +120,13 @@ class Path(NamedTuple):
 class Judgement(NamedTuple):
     """What a step is judged by.
 
-    Attributes
-    ----------
-    missed : float
-        Distance from the prediction to the corrected point; that of the states alone where larger. States that go slowly beside
-        a parameter are compared with their own rate, at the end of the step where it is larger.
-    turn : float
-        Angle between the tangents at both ends: the larger of the whole one and half that of the states alone. Where parameters
-        are large they dominate the norm, and tangents of different branches can look parallel.
-    length : float
-        Distance between both ends.
-    following : float
-        The length of the next step.
-    outcome : int
-        What the step comes to by itself.
+    - ``missed`` (float): Distance from the prediction to the corrected point; that of the states alone where larger. States
+      that go slowly beside a parameter are compared with their own rate, at the end of the step where it is larger.
+    - ``turn`` (float): Angle between the tangents at both ends: the larger of the whole one and half that of the states alone.
+      Where parameters are large they dominate the norm, and tangents of different branches can look parallel.
+    - ``length`` (float): Distance between both ends.
+    - ``following`` (float): The length of the next step.
+    - ``outcome`` (int): What the step comes to by itself.
     """
 
     missed: float

@@ -25,16 +25,11 @@ _ASIDE = (0.01, 0.1, 0.5)
 class Step(NamedTuple):
     """A step that was made.
 
-    Attributes
-    ----------
-    arc : Arc
-    judgement : Judgement
-    special : sequence of SpecialPoint
-        Inside it, in order.
-    turns : bool
-        The primary parameter turns inside it.
-    doubt : str
-        What is left of it where the step cannot be halved any more.
+    - ``arc`` (Arc)
+    - ``judgement`` (Judgement)
+    - ``special`` (sequence of SpecialPoint): Inside it, in order.
+    - ``turns`` (bool): The primary parameter turns inside it.
+    - ``doubt`` (str): What is left of it where the step cannot be halved any more.
     """
 
     arc: Arc
@@ -53,13 +48,9 @@ class Step(NamedTuple):
 class Steps:
     """How the steps of a run are made.
 
-    Attributes
-    ----------
-    settings : Settings
-    primary : str
-        The parameter whose folds are told.
-    fold : Event, optional
-        None where folds are not wanted.
+    - ``settings`` (Settings)
+    - ``primary`` (str): The parameter whose folds are told.
+    - ``fold`` (Event, optional): None where folds are not wanted.
     """
 
     settings: Settings

@@ -46,13 +46,9 @@ _WEIGHTS = {
 def derivative(function: Callable[[float], Any], order: int = 1, size: float = 1.0) -> tuple[Any, float]:
     """Return the derivative at 0 of a function of one number, a number or an array, and an estimate of its error.
 
-    Parameters
-    ----------
-    function : callable
-    order : int
-        1, 2 or 3.
-    size : float
-        The change of the argument that counts as one.
+    - ``function`` (callable)
+    - ``order`` (int): 1, 2 or 3.
+    - ``size`` (float): The change of the argument that counts as one.
 
     Returns
     -------

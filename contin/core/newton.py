@@ -59,18 +59,13 @@ class Newton:
 class Corrected:
     """A corrected point.
 
-    Attributes
-    ----------
-    x : ndarray, shape (size,)
-    factors : Factors
-        The last factorization, taken at an iterate before x.
-    iterations : int
-    error : float
-        Estimated error left, the largest component relative to 1 + |x|.
-    tangent : ndarray, shape (size,), or None
-        The unit tangent right at x, where it was asked for and is at hand; the factors are from there, too.
-    singular : bool
-        F_x is singular at x, up to its error.
+    - ``x`` (ndarray, shape (size,))
+    - ``factors`` (Factors): The last factorization, taken at an iterate before x.
+    - ``iterations`` (int)
+    - ``error`` (float): Estimated error left, the largest component relative to 1 + |x|.
+    - ``tangent`` (ndarray, shape (size,), or None): The unit tangent right at x, where it was asked for and is at hand; the
+      factors are from there, too.
+    - ``singular`` (bool): F_x is singular at x, up to its error.
     """
 
     x: Array

@@ -37,33 +37,20 @@ class Equations(Protocol):
 class Discretization(Equations, Protocol):
     """F(x) = 0 with free parameters at the end of x, as the continuation sees it.
 
-    Attributes
-    ----------
-    problem : Statement
-    free : tuple of str
-        The free parameters.
-    size : int
-        Number of unknowns.
-    state_size : int
-        Place of the first free parameter among them.
-    equations : int
-        Number of equations.
-    weights : ndarray, shape (size,)
-        Weights of the inner product.
-    aims : tuple of float
-        The usual `Settings.angle` and `Settings.accuracy`.
-    intervals, degree : int
-        Of the mesh; 0 without one.
-    scales : object
-        Sizes of states and parameters, by which they are divided in x; None where these are as they are.
-    free_scales : ndarray
-        Those of the free parameters.
-    order : int
-        Into how many equal parts a symmetry divides a cycle; x holds one of them.
-    plain : bool
-        Kernels may make the plain steps on its mesh.
-    leaving : mapping of str to tuple of str
-        Kinds of curves in two parameters that begin at, or pass, points of codimension two, by their label.
+    - ``problem`` (Statement)
+    - ``free`` (tuple of str): The free parameters.
+    - ``size`` (int): Number of unknowns.
+    - ``state_size`` (int): Place of the first free parameter among them.
+    - ``equations`` (int): Number of equations.
+    - ``weights`` (ndarray, shape (size,)): Weights of the inner product.
+    - ``aims`` (tuple of float): The usual `Settings.angle` and `Settings.accuracy`.
+    - ``intervals``, ``degree`` (int): Of the mesh; 0 without one.
+    - ``scales`` (object): Sizes of states and parameters, by which they are divided in x; None where these are as they are.
+    - ``free_scales`` (ndarray): Those of the free parameters.
+    - ``order`` (int): Into how many equal parts a symmetry divides a cycle; x holds one of them.
+    - ``plain`` (bool): Kernels may make the plain steps on its mesh.
+    - ``leaving`` (mapping of str to tuple of str): Kinds of curves in two parameters that begin at, or pass, points of
+      codimension two, by their label.
     """
 
     problem: Statement

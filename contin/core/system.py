@@ -147,15 +147,10 @@ class System(Discretization):
 
     Raises ProblemError for an unknown parameter.
 
-    Attributes
-    ----------
-    problem : Statement
-    free : tuple of str
-        The free parameters.
-    parameters : ndarray
-        Values of all parameters; those of the free ones are not used.
-    state_size : int
-        Where the free parameters begin in x; set by the kinds of system.
+    - ``problem`` (Statement)
+    - ``free`` (tuple of str): The free parameters.
+    - ``parameters`` (ndarray): Values of all parameters; those of the free ones are not used.
+    - ``state_size`` (int): Where the free parameters begin in x; set by the kinds of system.
     """
 
     parameters: Array

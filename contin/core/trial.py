@@ -22,13 +22,9 @@ from contin.text import shown
 class Linearization:
     """The tangent of a curve at a point, and the factored matrix [F_x; row] right there that it came from.
 
-    Attributes
-    ----------
-    tangent : ndarray, shape (size,)
-        Unit tangent.
-    sign : float
-        Sign of the determinant of [F_x; row].
-    factors : Factors or None
+    - ``tangent`` (ndarray, shape (size,)): Unit tangent.
+    - ``sign`` (float): Sign of the determinant of [F_x; row].
+    - ``factors`` (Factors or None)
     """
 
     tangent: Array

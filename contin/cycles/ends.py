@@ -64,17 +64,11 @@ _MISFIT = 0.25
 class RestingPlace:
     """The equilibrium near which a cycle spends most of its time.
 
-    Attributes
-    ----------
-    states : ndarray, shape (n,)
-    eigenvalues : ndarray of complex, shape (n,)
-        Those of the equilibrium, the largest real part first.
-    share : float
-        Part of the period that the cycle is near.
-    passes : int
-        How often it comes near in a period: twice where two saddles are one, as at the angles -pi and pi.
-    fold : bool
-        The equilibrium is that of a saddle-node, beside the value of the parameter.
+    - ``states`` (ndarray, shape (n,))
+    - ``eigenvalues`` (ndarray of complex, shape (n,)): Those of the equilibrium, the largest real part first.
+    - ``share`` (float): Part of the period that the cycle is near.
+    - ``passes`` (int): How often it comes near in a period: twice where two saddles are one, as at the angles -pi and pi.
+    - ``fold`` (bool): The equilibrium is that of a saddle-node, beside the value of the parameter.
     """
 
     states: Array

@@ -102,10 +102,7 @@ class OfCycles(Discretization):
 class PeriodicCollocation(OfCycles, Collocation):
     """A `CycleProblem` on a mesh: what forced and autonomous ones share.
 
-    Attributes
-    ----------
-    autonomous : bool
-        There is no forcing: the period is unknown, and an orbit may be shifted in time.
+    - ``autonomous`` (bool): There is no forcing: the period is unknown, and an orbit may be shifted in time.
     """
 
     problem: Any
@@ -445,10 +442,7 @@ class CycleCollocation(PeriodicCollocation):
 
     An angle that rotates gains whole rounds, which u(0) - u(1) contains; the phase row is then applied to u - v.
 
-    Attributes
-    ----------
-    reference : ndarray, shape (size,)
-        The cycle v; zero where `with_reference` has not set it.
+    - ``reference`` (ndarray, shape (size,)): The cycle v; zero where `with_reference` has not set it.
     """
 
     def _complete(self) -> None:

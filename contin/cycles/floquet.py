@@ -53,15 +53,11 @@ _MEANINGLESS = 1e-2
 class Floquet:
     """The Floquet multipliers of a cycle, which may be larger or smaller than numbers can be.
 
-    Attributes
-    ----------
-    logarithms : ndarray of complex, shape (n,)
-        Natural logarithms of the multipliers, the largest first; a multiplier with a positive real part is unstable.
-    errors : ndarray, shape (n,)
-        Estimated errors of the logarithms: their change on a mesh halved and, for the multiplier of an autonomous system that
-        is 1, its own. NaN where the cycle is not found on that mesh. Of maps, round-off.
-    unstable : int
-        Number of unstable multipliers, without the one that is 1.
+    - ``logarithms`` (ndarray of complex, shape (n,)): Natural logarithms of the multipliers, the largest first; a multiplier
+      with a positive real part is unstable.
+    - ``errors`` (ndarray, shape (n,)): Estimated errors of the logarithms: their change on a mesh halved and, for the
+      multiplier of an autonomous system that is 1, its own. NaN where the cycle is not found on that mesh. Of maps, round-off.
+    - ``unstable`` (int): Number of unstable multipliers, without the one that is 1.
     """
 
     logarithms: ComplexArray

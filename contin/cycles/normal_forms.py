@@ -71,12 +71,8 @@ if TYPE_CHECKING:
 class Collocated:
     """The collocation equations C of a cycle with the rows H: solves with the matrix [C; H].
 
-    Attributes
-    ----------
-    free : ndarray, shape (n, states)
-        Solutions of C v = 0: the first has H v = (1, 0, ...).
-    inside : int
-        Number of rows of C.
+    - ``free`` (ndarray, shape (n, states)): Solutions of C v = 0: the first has H v = (1, 0, ...).
+    - ``inside`` (int): Number of rows of C.
     """
 
     def __init__(self, system: PeriodicCollocation, x: Array) -> None:
@@ -114,13 +110,9 @@ class Solver:
 
     Unknowns are [v_1, a_1, v_2, a_2, ... | g_1, g_2, ...]; equations are [those of each copy | the rows c of each copy].
 
-    Parameters
-    ----------
-    around : Round
-    coupling : ndarray, shape (copies, copies)
-        P.
-    border : pair of ndarray, shape (size,), optional
-        b and c of each copy.
+    - ``around`` (Round)
+    - ``coupling`` (ndarray, shape (copies, copies)): P.
+    - ``border`` (pair of ndarray, shape (size,), optional): b and c of each copy.
     """
 
     def __init__(self, around: Round, coupling: Array, border: tuple[Array, Array] | None = None) -> None:
@@ -196,18 +188,12 @@ class Solver:
 class Round:
     """The linearization of a cycle x over one round.
 
-    Parameters
-    ----------
-    system : PeriodicCollocation
-    x : ndarray, shape (size,)
-    phased : bool
-        With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of autonomous
-        systems only.
+    - ``system`` (PeriodicCollocation)
+    - ``x`` (ndarray, shape (size,))
+    - ``phased`` (bool): With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of
+      autonomous systems only.
 
-    Attributes
-    ----------
-    size : int
-        Number of equations, and of unknowns, of one copy.
+    - ``size`` (int): Number of equations, and of unknowns, of one copy.
     """
 
     states: int
@@ -255,10 +241,8 @@ def multiplier(rate: complex) -> Any:
 class MapForm(DenseForm):
     """That of a cycle of a map.
 
-    Parameters
-    ----------
-    system : MapSystem
-    x : ndarray, shape (size,)
+    - ``system`` (MapSystem)
+    - ``x`` (ndarray, shape (size,))
     """
 
     doubled_side = -1
@@ -281,10 +265,8 @@ class MapForm(DenseForm):
 class CycleForm(Form):
     """That of a cycle of a vector field.
 
-    Parameters
-    ----------
-    system : PeriodicCollocation
-    x : ndarray, shape (size,)
+    - ``system`` (PeriodicCollocation)
+    - ``x`` (ndarray, shape (size,))
     """
 
     def __init__(self, system: PeriodicCollocation, x: Array) -> None:

@@ -457,12 +457,8 @@ def _at_time(field: Function, names: Sequence[str]) -> Function:
 class FollowedProblem(CycleProblem):
     """Cycles with functionals that are states which follow from others; their extremes are columns, as those of states.
 
-    Parameters
-    ----------
-    field, states, parameters, functionals, period, angles
-        As of a `CycleProblem`.
-    following : sequence of str
-        Names of these functionals.
+    - ``field``, ``states``, ``parameters``, ``functionals``, ``period``, ``angles``: As of a `CycleProblem`.
+    - ``following`` (sequence of str): Names of these functionals.
     """
 
     def __init__(

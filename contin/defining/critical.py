@@ -51,12 +51,8 @@ from contin.linalg.border import Bordered, null_vectors
 class CriticalCurve(Defining):
     """F = 0 and g = 0, in the free parameters of ``base``: the last one is the second parameter of the curve.
 
-    Parameters
-    ----------
-    base : System
-        With one free parameter more than a curve of solutions needs.
-    size : float
-        Of kappa, by which it is divided in x.
+    - ``base`` (System): With one free parameter more than a curve of solutions needs.
+    - ``size`` (float): Of kappa, by which it is divided in x.
     """
 
     #: That of the coefficient of the normal form, and others.

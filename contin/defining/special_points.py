@@ -72,10 +72,7 @@ _SMALL = 0.3
 class FoldCurve(Defining):
     """F = 0 and F_z singular, in the free parameters of ``base``: the last one is the second parameter of the curve.
 
-    Parameters
-    ----------
-    base : System
-        With one free parameter more than a curve of solutions needs: the first is the one of the folds.
+    - ``base`` (System): With one free parameter more than a curve of solutions needs: the first is the one of the folds.
     """
 
     kind = Label.FOLD
@@ -193,10 +190,7 @@ _MEETS: Event = Event(
 class BranchPointCurve(Defining):
     """F + beta psi = 0 with both g zero; unknowns [those of ``base`` | beta].
 
-    Parameters
-    ----------
-    base : System
-        With one free parameter more than a curve of solutions needs: the last one is the second parameter.
+    - ``base`` (System): With one free parameter more than a curve of solutions needs: the last one is the second parameter.
     """
 
     kind = Label.BRANCH_POINT
@@ -234,11 +228,8 @@ class BranchPointCurve(Defining):
 class ExtremumCurve(Defining):
     """F = 0 and g = 0; the last free parameter of ``base`` is the one that is held in the extrema.
 
-    Parameters
-    ----------
-    base : System
-    objective : str
-        The column G.
+    - ``base`` (System)
+    - ``objective`` (str): The column G.
     """
 
     def __init__(self, base: System, objective: str) -> None:
@@ -301,14 +292,9 @@ class _Solutions(NamedTuple):
 class EventCurve(Defining):
     """F = 0 and e = 0, in the free parameters of ``base``.
 
-    Parameters
-    ----------
-    base : System or Defining
-        With one free parameter more than its curves need.
-    event : Event
-        Whose function keeps the value zero. Where its ``confirm`` says that a zero is none, the curve ends.
-    gradient : callable, optional
-        ``gradient(system, x)`` returns the derivatives by x, shape (size,).
+    - ``base`` (System or Defining): With one free parameter more than its curves need.
+    - ``event`` (Event): Whose function keeps the value zero. Where its ``confirm`` says that a zero is none, the curve ends.
+    - ``gradient`` (callable, optional): ``gradient(system, x)`` returns the derivatives by x, shape (size,).
     """
 
     def __init__(

@@ -65,21 +65,12 @@ class Defining(Discretization):
 
     Raises ProblemError where the problem has a column of such a name.
 
-    Parameters
-    ----------
-    base : System
-        Or a defining system: it has what is used of a system here.
-    size : float
-        Of the unknowns that the curve adds, by which they are divided in x.
+    - ``base`` (System): Or a defining system: it has what is used of a system here.
+    - ``size`` (float): Of the unknowns that the curve adds, by which they are divided in x.
 
-    Attributes
-    ----------
-    kind : str
-        The letters of the special points that the curve consists of.
-    own_equations, own_unknowns : int
-        k and the number of unknowns z.
-    own_columns : tuple of str
-        Names of columns beyond those of ``base``.
+    - ``kind`` (str): The letters of the special points that the curve consists of.
+    - ``own_equations``, ``own_unknowns`` (int): k and the number of unknowns z.
+    - ``own_columns`` (tuple of str): Names of columns beyond those of ``base``.
     """
 
     kind = ""

@@ -275,19 +275,13 @@ class KeptProblem(AlgebraicProblem):
 class ReducedProblem(AlgebraicProblem):
     """The equilibria of a vector field without the states that follow from conserved totals, which are parameters.
 
-    Parameters
-    ----------
-    whole : AlgebraicProblem
-    totals : ndarray, shape (m, n)
-        The factors of the states in each total, in reduced echelon form: the first state that no other total contains, with the
-        factor 1, follows from it and the states that are kept.
+    - ``whole`` (AlgebraicProblem)
+    - ``totals`` (ndarray, shape (m, n)): The factors of the states in each total, in reduced echelon form: the first state that
+      no other total contains, with the factor 1, follows from it and the states that are kept.
 
-    Attributes
-    ----------
-    kept : list of int
-        Places of the states that are kept.
-    total_names, following : tuple of str
-        Names of the parameters, and of the states that follow from them, in the same order; then of others that follow.
+    - ``kept`` (list of int): Places of the states that are kept.
+    - ``total_names``, ``following`` (tuple of str): Names of the parameters, and of the states that follow from them, in the
+      same order; then of others that follow.
     """
 
     whole: AlgebraicProblem

@@ -118,10 +118,8 @@ def _secant(one: Value, other: Value) -> float:
 class _Course:
     """How a bracket closes, while the larger value at its ends does not become half as small.
 
-    Attributes
-    ----------
-    scatters : bool
-        Values are round-off: the bracket closes, and they are alike at both ends, where a jump may have a flat side.
+    - ``scatters`` (bool): Values are round-off: the bracket closes, and they are alike at both ends, where a jump may have a
+      flat side.
     """
 
     def __init__(self, width: float, value: float) -> None:
@@ -168,27 +166,17 @@ Place = tuple[float, Trial]
 class SpecialPoint:
     """A point located inside a step.
 
-    Attributes
-    ----------
-    at : float
-        Distance from the beginning of the step, along the tangent there.
-    label, name : str
-        As in `Event`.
-    trial : Trial
-    stop : Stop, optional
-        The run ends here.
-    details : object
-        As in `contin.Point`.
-    test : Event, optional
-        Vanishes here.
-    same_as : SpecialPoint, optional
-        The fold or branch point that lies at the same place and is located better.
-    errors : mapping of str to float, optional
-        Errors of the free parameters, where they are known from how the point was found.
-    is_lost : bool
-        It was looked for on a finer mesh, and is not there.
-    is_located : bool
-        It was found, and not only bracketed.
+    - ``at`` (float): Distance from the beginning of the step, along the tangent there.
+    - ``label``, ``name`` (str): As in `Event`.
+    - ``trial`` (Trial)
+    - ``stop`` (Stop, optional): The run ends here.
+    - ``details`` (object): As in `contin.Point`.
+    - ``test`` (Event, optional): Vanishes here.
+    - ``same_as`` (SpecialPoint, optional): The fold or branch point that lies at the same place and is located better.
+    - ``errors`` (mapping of str to float, optional): Errors of the free parameters, where they are known from how the point was
+      found.
+    - ``is_lost`` (bool): It was looked for on a finer mesh, and is not there.
+    - ``is_located`` (bool): It was found, and not only bracketed.
     """
 
     at: float
@@ -234,18 +222,13 @@ class SpecialPoint:
 class Arc:
     """The piece of a curve between the state of a run and the corrected point at the end of a step.
 
-    Parameters
-    ----------
-    state : State
-    before : tuple (float, Trial)
-        Where test functions start from: the state's point or, where that is a branch point, one close to it; and its distance
-        along the state's tangent.
-    trial : Trial
-        The end, at ``step`` along the state's tangent.
-    step : float
-    newton : Newton
-    settles : bool
-        Points are settled (`contin.core.step`).
+    - ``state`` (State)
+    - ``before`` (tuple (float, Trial)): Where test functions start from: the state's point or, where that is a branch point,
+      one close to it; and its distance along the state's tangent.
+    - ``trial`` (Trial): The end, at ``step`` along the state's tangent.
+    - ``step`` (float)
+    - ``newton`` (Newton)
+    - ``settles`` (bool): Points are settled (`contin.core.step`).
     """
 
     def __init__(self, state: State, before: Place, trial: Trial, step: float, newton: Newton, settles: bool = False) -> None:

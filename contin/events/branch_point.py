@@ -48,26 +48,16 @@ _REGULAR = 1e-8
 class BorderedMatrix:
     """M at x for given borders, factored.
 
-    Parameters
-    ----------
-    system : Discretization
-    x : ndarray, shape (size,)
-    phi : ndarray, shape (2, size)
-        The rows Phi, without the weights of the inner product.
-    psi : ndarray, shape (equations,)
-        The column.
+    - ``system`` (Discretization)
+    - ``x`` (ndarray, shape (size,))
+    - ``phi`` (ndarray, shape (2, size)): The rows Phi, without the weights of the inner product.
+    - ``psi`` (ndarray, shape (equations,)): The column.
 
-    Attributes
-    ----------
-    borders : pair of ndarray
-        Phi and psi.
-    residual : ndarray, shape (equations,)
-        F(x).
-    kernel : ndarray, shape (2, size)
-        v_1, v_2.
-    g : ndarray, shape (2,)
-        Gradient of beta.
-    factors : Factors
+    - ``borders`` (pair of ndarray): Phi and psi.
+    - ``residual`` (ndarray, shape (equations,)): F(x).
+    - ``kernel`` (ndarray, shape (2, size)): v_1, v_2.
+    - ``g`` (ndarray, shape (2,)): Gradient of beta.
+    - ``factors`` (Factors)
     """
 
     def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:

@@ -41,14 +41,9 @@ _PARTS, _NEAR, _LOOKS = (0.25, 0.5, 0.75), 0.1, 4
 class Corner(Finding):
     """A point at which conditions change their outcomes.
 
-    Attributes
-    ----------
-    kind : str
-        "goes on", "fold" (the primary parameter turns), "several" (ways lead on) or "end", with the reason.
-    ways : tuple of ndarray
-        Unit tangents of the ways that lead on, the one nearest to the branch first.
-    unstable : tuple of int or None
-        Numbers of unstable eigenvalues before and, on the first way, behind it.
+    - ``kind`` (str): "goes on", "fold" (the primary parameter turns), "several" (ways lead on) or "end", with the reason.
+    - ``ways`` (tuple of ndarray): Unit tangents of the ways that lead on, the one nearest to the branch first.
+    - ``unstable`` (tuple of int or None): Numbers of unstable eigenvalues before and, on the first way, behind it.
     """
 
     kind: str

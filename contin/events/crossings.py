@@ -70,12 +70,8 @@ _GLANCES = 2
 def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
     """Return how the singular values that change most do so between two points, from factors there: shape (watched,), complex.
 
-    Parameters
-    ----------
-    before, after : Factors
-        Of [F_x; row] with one row.
-    size : int
-        Of the matrix.
+    - ``before``, ``after`` (Factors): Of [F_x; row] with one row.
+    - ``size`` (int): Of the matrix.
 
     Returns
     -------
@@ -96,10 +92,7 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
 def quotients_along(factors: Callable[[float], Factors]) -> ComplexArray | None:
     """Return how singular values change from each of some places of a step to the next, where condensed matrices decide.
 
-    Parameters
-    ----------
-    factors : callable
-        Returns those of [F_x; row] at a part of the step, from 0 to 1.
+    - ``factors`` (callable): Returns those of [F_x; row] at a part of the step, from 0 to 1.
 
     Returns
     -------

@@ -78,16 +78,11 @@ def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int, longer: fl
 def separated(arc: Arc, test: Event, knots: list[Place], parts: Sequence[float], dips: bool = True) -> list[Place]:
     """Return the places of a step, and further ones where a test function has several zeros between two of them.
 
-    Parameters
-    ----------
-    arc : Arc
-    test : Event
-    knots : list of (float, Trial)
-        Places, in order.
-    parts : sequence of float
-        Parts of the step at which it is looked at, on the cubic.
-    dips : bool
-        Dips are followed.
+    - ``arc`` (Arc)
+    - ``test`` (Event)
+    - ``knots`` (list of (float, Trial)): Places, in order.
+    - ``parts`` (sequence of float): Parts of the step at which it is looked at, on the cubic.
+    - ``dips`` (bool): Dips are followed.
     """
     inside = [arc.step * part for part in parts]
     looked = _in_order([*knots, *((s, arc.guessed(s)) for s in inside)])
@@ -146,19 +141,12 @@ def followed(
 ) -> Place | None:  # fmt: skip
     """Return a place where a function that dips towards zero has passed it; None where it turns before.
 
-    Parameters
-    ----------
-    place : callable
-        Returns the place at a distance.
-    value : callable
-        Returns the function at a trial; it is positive at the ends.
-    dip : tuple of float
-        About the lowest place, and half the second derivative there: by that and the value, the lowest place is no further off
-        than the places on both sides that are looked at, where the function has doubled.
-    ends : tuple of float
-        Distances between which it lies.
-    flat : float
-        A lowest value within this of zero is zero to round-off: an inflection.
+    - ``place`` (callable): Returns the place at a distance.
+    - ``value`` (callable): Returns the function at a trial; it is positive at the ends.
+    - ``dip`` (tuple of float): About the lowest place, and half the second derivative there: by that and the value, the lowest
+      place is no further off than the places on both sides that are looked at, where the function has doubled.
+    - ``ends`` (tuple of float): Distances between which it lies.
+    - ``flat`` (float): A lowest value within this of zero is zero to round-off: an inflection.
     """
     (at, square), lowest = dip, math.inf
     while ends[0] <= at <= ends[1]:

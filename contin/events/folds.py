@@ -197,13 +197,10 @@ def may_turn(arc: Arc, fold: Event) -> bool:
 class FoldSearch:
     """The search for folds inside one step.
 
-    Parameters
-    ----------
-    arc : Arc
-    fold : Event
-        The tangent's component of the primary parameter, which is its name.
-    pitchfork : callable
-        Returns the fold at the branch point inside the step, where the parameter turns right there, or None.
+    - ``arc`` (Arc)
+    - ``fold`` (Event): The tangent's component of the primary parameter, which is its name.
+    - ``pitchfork`` (callable): Returns the fold at the branch point inside the step, where the parameter turns right there, or
+      None.
     """
 
     def __init__(self, arc: Arc, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:

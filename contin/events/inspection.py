@@ -91,17 +91,11 @@ Start = tuple[Discretization, Array, Array]
 class Sought(NamedTuple):
     """What a run looks for.
 
-    Attributes
-    ----------
-    settings : Settings
-        Those that it begins with.
-    start : tuple (system, x, tangent)
-        Its first point, to recognise a closed branch.
-    tests : sequence of Event
-    fold : Event or None
-        The tangent's component of the primary parameter; None where folds are not looked for.
-    ends : sequence of callables
-        ``end(inspection)``: the end of the branch inside a step that it knows of, or None.
+    - ``settings`` (Settings): Those that it begins with.
+    - ``start`` (tuple (system, x, tangent)): Its first point, to recognise a closed branch.
+    - ``tests`` (sequence of Event)
+    - ``fold`` (Event or None): The tangent's component of the primary parameter; None where folds are not looked for.
+    - ``ends`` (sequence of callables): ``end(inspection)``: the end of the branch inside a step that it knows of, or None.
     """
 
     settings: Settings

@@ -66,20 +66,13 @@ class Window:
 class InterpolatedZero(Finding):
     """A common zero of test functions, between points of a curve.
 
-    Attributes
-    ----------
-    trial : Trial
-        The point, with the tangent of the polynomial.
-    at : float
-        Distance along the state's tangent.
-    window : Window
-    points : ndarray, shape (count, size)
-        x at the nodes.
-    functions : sequence of callable
-        The first one has its zero there.
-    newton_error : float
-        Largest error that Newton's method has left of a point, relative to 1 + |x|: so near to a singular point, zeros on two
-        meshes may agree better.
+    - ``trial`` (Trial): The point, with the tangent of the polynomial.
+    - ``at`` (float): Distance along the state's tangent.
+    - ``window`` (Window)
+    - ``points`` (ndarray, shape (count, size)): x at the nodes.
+    - ``functions`` (sequence of callable): The first one has its zero there.
+    - ``newton_error`` (float): Largest error that Newton's method has left of a point, relative to 1 + |x|: so near to a
+      singular point, zeros on two meshes may agree better.
     """
 
     trial: Trial

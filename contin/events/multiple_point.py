@@ -191,14 +191,10 @@ def locate_multiple_point(
 ) -> MultiplePoint:
     """Return the multiple point near x, with the tangents of its branches; raise ConvergenceError where none was found.
 
-    Parameters
-    ----------
-    system : Collocation or alike
-    x : ndarray, shape (size,)
-    row : ndarray, shape (size,)
-        Borders F_x: the tangent of the branch times the weights.
-    dimension : int
-        d, the number of singular values that vanish.
+    - ``system`` (Collocation or alike)
+    - ``x`` (ndarray, shape (size,))
+    - ``row`` (ndarray, shape (size,)): Borders F_x: the tangent of the branch times the weights.
+    - ``dimension`` (int): d, the number of singular values that vanish.
     """
     with np.errstate(all="ignore"):
         manifold, s = _bordered(system, x, row, dimension, newton), np.zeros(1 + dimension)

@@ -127,16 +127,10 @@ class Direction(NamedTuple):
 class Form(ABC):
     """The characteristic matrix at a solution, L(P) for copies of the unknowns that a small matrix P couples, and the forms.
 
-    Attributes
-    ----------
-    places : ndarray of int
-        Where the unknowns of one copy stand in x.
-    equations : int
-        Number of equations of one copy, which come first in F.
-    weights : ndarray
-        Of the unknowns of one copy.
-    doubled_side : int
-        Sign of the coefficient of a subcritical period doubling.
+    - ``places`` (ndarray of int): Where the unknowns of one copy stand in x.
+    - ``equations`` (int): Number of equations of one copy, which come first in F.
+    - ``weights`` (ndarray): Of the unknowns of one copy.
+    - ``doubled_side`` (int): Sign of the coefficient of a subcritical period doubling.
     """
 
     places: Indices
@@ -208,15 +202,10 @@ class Form(ABC):
 class DenseForm(Form):
     """One whose matrix is open - P E, with E one where ``places`` of the last equations meet those of the first unknowns.
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (size, size)
-        ``open``.
-    count : int
-        Number of rows of E that are not zero.
-    along : callable
-        ``along(stacks)`` returns B or C along several stacks of real directions.
-    weights : ndarray, shape (size,)
+    - ``matrix`` (ndarray, shape (size, size)): ``open``.
+    - ``count`` (int): Number of rows of E that are not zero.
+    - ``along`` (callable): ``along(stacks)`` returns B or C along several stacks of real directions.
+    - ``weights`` (ndarray, shape (size,))
     """
 
     def __init__(self, matrix: Array, count: int, along: Callable[[Any], Array], weights: Array) -> None:

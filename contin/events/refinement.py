@@ -52,14 +52,12 @@ _AWAY = 1.0
 class Refined:
     """A special point on the finest mesh that it was located on.
 
-    Attributes
-    ----------
-    trial : Trial
-    errors : dict
-        By how much its free parameters differ from those on the mesh before; NaN where it could not be located again.
-    details : object
-    is_lost : bool
-        It was looked for, and is not there. Where Newton's method fails, nothing is known: the point is not lost.
+    - ``trial`` (Trial)
+    - ``errors`` (dict): By how much its free parameters differ from those on the mesh before; NaN where it could not be located
+      again.
+    - ``details`` (object)
+    - ``is_lost`` (bool): It was looked for, and is not there. Where Newton's method fails, nothing is known: the point is not
+      lost.
     """
 
     trial: Trial

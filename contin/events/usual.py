@@ -114,25 +114,17 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
 class Stationarity:
     """Derivatives of a column on the manifold F = 0 at x, with some unknowns held.
 
-    Parameters
-    ----------
-    system : System
-    x : ndarray, shape (size,)
-    column : str
-    held : sequence of int
-        Places of the unknowns that do not move.
-    phi : ndarray, shape (j, size), optional
-        The rows Phi; random ones by default.
+    - ``system`` (System)
+    - ``x`` (ndarray, shape (size,))
+    - ``column`` (str)
+    - ``held`` (sequence of int): Places of the unknowns that do not move.
+    - ``phi`` (ndarray, shape (j, size), optional): The rows Phi; random ones by default.
 
-    Attributes
-    ----------
-    kernel : ndarray, shape (j, size)
-        V, as rows.
-    g : ndarray, shape (j,)
-    residual, factors, solutions
-        F, the factors of M, with rows of what is held, and the solutions for units of all rows besides F_x.
-    by_held : ndarray
-        At an extremum, the derivatives of G by the unknowns that are held, the extremum staying one.
+    - ``kernel`` (ndarray, shape (j, size)): V, as rows.
+    - ``g`` (ndarray, shape (j,))
+    - ``residual``, ``factors``, ``solutions``: F, the factors of M, with rows of what is held, and the solutions for units of
+      all rows besides F_x.
+    - ``by_held`` (ndarray): At an extremum, the derivatives of G by the unknowns that are held, the extremum staying one.
     """
 
     def __init__(self, system: System, x: Array, column: str, held: Sequence[int] = (), phi: Array | None = None) -> None:

@@ -31,15 +31,10 @@ Doubts = Callable[[Inspection], str]
 class Watch:
     """What the test functions of a run say of its steps.
 
-    Parameters
-    ----------
-    start : tuple (system, x, tangent)
-        The first point of the run; other systems of it have the same free parameters.
-    settings : Settings
-    tests, general : sequence of Event
-        All, and those that have the same sign on every mesh.
-    fold : Event, optional
-        The rate of the primary parameter; None where folds are not wanted.
+    - ``start`` (tuple (system, x, tangent)): The first point of the run; other systems of it have the same free parameters.
+    - ``settings`` (Settings)
+    - ``tests``, ``general`` (sequence of Event): All, and those that have the same sign on every mesh.
+    - ``fold`` (Event, optional): The rate of the primary parameter; None where folds are not wanted.
     """
 
     def __init__(

@@ -39,16 +39,10 @@ from contin.threads import PARTS
 class Request(NamedTuple):
     """Derivatives of functions that a batch is asked for.
 
-    Attributes
-    ----------
-    inputs : tuple of int, optional
-        The inputs that the Jacobian has columns for; None asks for no Jacobian.
-    order : int
-        Number of directions that the values or, where it is asked for, the Jacobian is differentiated along.
-    weighted : bool
-        The Jacobian is that of one value, the sum of the derivatives along one direction with weights.
-    packed : bool
-        The Jacobian is a row of the entries that may differ from zero.
+    - ``inputs`` (tuple of int, optional): The inputs that the Jacobian has columns for; None asks for no Jacobian.
+    - ``order`` (int): Number of directions that the values or, where it is asked for, the Jacobian is differentiated along.
+    - ``weighted`` (bool): The Jacobian is that of one value, the sum of the derivatives along one direction with weights.
+    - ``packed`` (bool): The Jacobian is a row of the entries that may differ from zero.
     """
 
     inputs: tuple[int, ...] | None = None
@@ -290,15 +284,10 @@ class _Estimated(NamedTuple):
 class Interpreted:
     """Functions evaluated in Python, for `contin.functions.batch.Batch`.
 
-    Attributes
-    ----------
-    reason : str
-        Why the functions are not recorded.
-    kept : dict
-        What a batch has made for these functions.
-    error : float
-        Largest estimated error of a derivative so far, relative to the largest derivative at its place and to the values over
-        the sizes of the inputs.
+    - ``reason`` (str): Why the functions are not recorded.
+    - ``kept`` (dict): What a batch has made for these functions.
+    - ``error`` (float): Largest estimated error of a derivative so far, relative to the largest derivative at its place and to
+      the values over the sizes of the inputs.
     """
 
     def __init__(self, functions: Sequence[UserFunction], signature: Signature, reason: str) -> None:
@@ -475,12 +464,8 @@ class Interpreted:
 class Columns:
     """The inputs to differentiate by, in order, and the entries of that Jacobian that may differ from zero.
 
-    Attributes
-    ----------
-    inputs : ndarray of int, shape (columns,)
-        Their numbers among u, v and p.
-    rows, places : ndarray of int
-        Values and columns of the entries.
+    - ``inputs`` (ndarray of int, shape (columns,)): Their numbers among u, v and p.
+    - ``rows``, ``places`` (ndarray of int): Values and columns of the entries.
     """
 
     inputs: Indices

@@ -147,10 +147,8 @@ def partials_of(tape: Tape, place: int) -> list[int | None]:
 def tangents(tape: Tape, results: Sequence[int], along: Mapping[int, int]) -> list[int]:
     """Return the derivatives of ``results`` along a direction: forward mode, an operation or two for each on the tape.
 
-    Parameters
-    ----------
-    along : mapping of int to int
-        The places of the inputs, and of the components of the direction (operations that depend on no input of these).
+    - ``along`` (mapping of int to int): The places of the inputs, and of the components of the direction (operations that
+      depend on no input of these).
 
     Examples
     --------

@@ -19,14 +19,9 @@ _DECIDED = ("lt", "le", "abs", "sign", "table")
 class Outcomes(NamedTuple):
     """Functions with outcomes as inputs ``("side", k)``, by places on their tape.
 
-    Attributes
-    ----------
-    results : tuple of int
-        The functions.
-    numbers : tuple of int
-        The numbers whose signs decide: they may depend on the outcomes before them. g and -g are one.
-    origins : tuple of int
-        The conditions as they are recorded.
+    - ``results`` (tuple of int): The functions.
+    - ``numbers`` (tuple of int): The numbers whose signs decide: they may depend on the outcomes before them. g and -g are one.
+    - ``origins`` (tuple of int): The conditions as they are recorded.
     """
 
     results: tuple[int, ...]

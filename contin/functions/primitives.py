@@ -43,27 +43,19 @@ class Recorder(Protocol):
 class Primitive:
     """An operation.
 
-    Attributes
-    ----------
-    evaluate : callable
-        ``evaluate(data, *operands)`` returns the value for plain numbers; never an exception, but nan or inf.
-    partials : callable
-        ``partials(tape, data, operands, result)`` returns the derivative by each operand: a recorded number, a number, or None
-        where it is zero everywhere.
-    external : str
-        The C library's function.
-    ufunc : str
-        Name of the universal function of NumPy or SciPy that records the operation.
-    pair : callable, optional
-        ``pair(apply, x, y)`` returns the real and the imaginary part of the function of x + i y; ``apply`` is that of the tape.
-    constant : callable, optional
-        ``evaluate`` where an operation of constants is carried out when it is recorded.
-    simplify : callable, optional
-        ``simplify(tape, places)`` returns the place of an equal operation that is simpler, or None.
-    commutes : bool
-        The two operands may be exchanged.
-    selects : bool
-        A derivative is zero where the operand is not chosen, and the value there may be nan.
+    - ``evaluate`` (callable): ``evaluate(data, *operands)`` returns the value for plain numbers; never an exception, but nan or
+      inf.
+    - ``partials`` (callable): ``partials(tape, data, operands, result)`` returns the derivative by each operand: a recorded
+      number, a number, or None where it is zero everywhere.
+    - ``external`` (str): The C library's function.
+    - ``ufunc`` (str): Name of the universal function of NumPy or SciPy that records the operation.
+    - ``pair`` (callable, optional): ``pair(apply, x, y)`` returns the real and the imaginary part of the function of x + i y;
+      ``apply`` is that of the tape.
+    - ``constant`` (callable, optional): ``evaluate`` where an operation of constants is carried out when it is recorded.
+    - ``simplify`` (callable, optional): ``simplify(tape, places)`` returns the place of an equal operation that is simpler, or
+      None.
+    - ``commutes`` (bool): The two operands may be exchanged.
+    - ``selects`` (bool): A derivative is zero where the operand is not chosen, and the value there may be nan.
     """
 
     evaluate: Callable[..., float]

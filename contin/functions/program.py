@@ -50,27 +50,17 @@ class Inputs:
 class Program:
     """Instructions, and what they need.
 
-    Attributes
-    ----------
-    code : ndarray of int, shape (instructions, 5)
-    first, last : int
-        Ends of the first and of the second stretch. Behind are the instructions of searches, which both may use.
-    lists : ndarray of int
-        Operands of instructions that take any number.
-    scalars : ndarray
-        The constants, then room for the parameters and for what the first stretch computes.
-    parameters : int
-        Where the parameters stand among the scalars.
-    registers : int
-        Number of registers.
-    operations : int
-        Number of arithmetic instructions of the second stretch.
-    tables : ndarray
-        Piecewise polynomials.
-    unknowns : int
-        Largest number of unknowns that are found together.
-    rooms : list
-        What the interpreter works in: one for each thread that has run the program.
+    - ``code`` (ndarray of int, shape (instructions, 5))
+    - ``first``, ``last`` (int): Ends of the first and of the second stretch. Behind are the instructions of searches, which
+      both may use.
+    - ``lists`` (ndarray of int): Operands of instructions that take any number.
+    - ``scalars`` (ndarray): The constants, then room for the parameters and for what the first stretch computes.
+    - ``parameters`` (int): Where the parameters stand among the scalars.
+    - ``registers`` (int): Number of registers.
+    - ``operations`` (int): Number of arithmetic instructions of the second stretch.
+    - ``tables`` (ndarray): Piecewise polynomials.
+    - ``unknowns`` (int): Largest number of unknowns that are found together.
+    - ``rooms`` (list): What the interpreter works in: one for each thread that has run the program.
     """
 
     code: Indices
@@ -192,17 +182,12 @@ _SILENT = ("load u", "load v", "load t", "fill", "keep", "store", "store scalar"
 class _Stretch:
     """Instructions in a row, and their registers.
 
-    Parameters
-    ----------
-    shared : _Lowering
-    places : sequence of int
-        The operations, in order.
-    moves : mapping of int to list
-        Where results go, by operation: the instruction that moves each (store, keep, copy), and its target.
-    given : mapping of int to int
-        Registers of operations that are computed elsewhere.
-    first : int
-        The first register that may be used.
+    - ``shared`` (_Lowering)
+    - ``places`` (sequence of int): The operations, in order.
+    - ``moves`` (mapping of int to list): Where results go, by operation: the instruction that moves each (store, keep, copy),
+      and its target.
+    - ``given`` (mapping of int to int): Registers of operations that are computed elsewhere.
+    - ``first`` (int): The first register that may be used.
     """
 
     def __init__(

@@ -42,13 +42,9 @@ _PATHS = 64
 class Recording:
     """Recorded functions.
 
-    Attributes
-    ----------
-    tape : Tape
-    results : tuple of int
-        Places of all values, in order.
-    time, inputs : int and tuple of int
-        Places of t, and of u, v and p.
+    - ``tape`` (Tape)
+    - ``results`` (tuple of int): Places of all values, in order.
+    - ``time``, ``inputs`` (int and tuple of int): Places of t, and of u, v and p.
     """
 
     tape: Tape

@@ -26,14 +26,9 @@ Maker = Callable[[Any], Any]
 class Signature:
     """Arguments of a function of a point: f(t, u, p), f(u, p), or f(u, v, p) of the states at both ends.
 
-    Attributes
-    ----------
-    states, parameters : tuple of str
-        Names of the components of u (and v), and of p.
-    times : bool
-        t is the first argument.
-    ends : bool
-        v follows u; there is no t then.
+    - ``states``, ``parameters`` (tuple of str): Names of the components of u (and v), and of p.
+    - ``times`` (bool): t is the first argument.
+    - ``ends`` (bool): v follows u; there is no t then.
     """
 
     states: tuple[str, ...]
@@ -60,14 +55,10 @@ class Signature:
 class UserFunction:
     """A user's function with the way in which it takes its arguments.
 
-    Parameters
-    ----------
-    function : callable
-        It takes named tuples; or arrays of states, and parameters as a named tuple; or arrays, and one more that it fills.
-    arguments : sequence
-        Names of the components of each argument.
-    count : int
-        Number of values; 0 for one number that is no tuple.
+    - ``function`` (callable): It takes named tuples; or arrays of states, and parameters as a named tuple; or arrays, and one
+      more that it fills.
+    - ``arguments`` (sequence): Names of the components of each argument.
+    - ``count`` (int): Number of values; 0 for one number that is no tuple.
     """
 
     def __init__(self, function: Function, arguments: Arguments, count: int) -> None:

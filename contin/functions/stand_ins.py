@@ -32,20 +32,14 @@ from contin.functions.tape import Number, Table, Tape, Unrecordable
 class RecordedFunction:
     """A function given by operations on a tape.
 
-    Parameters
-    ----------
-    name : str
-    names : sequence of str
-        Of its arguments.
-    arguments : sequence of tuple of str, list of them, or None
-        Names of the components of each argument; a list stands for a tuple of named tuples, None for a number.
-    tape : Tape
-    inputs : sequence of int
-        Places of all components of the arguments, in order.
-    results : sequence of int
-        Places of the values.
-    single : bool
-        It returns a number, not a tuple.
+    - ``name`` (str)
+    - ``names`` (sequence of str): Of its arguments.
+    - ``arguments`` (sequence of tuple of str, list of them, or None): Names of the components of each argument; a list stands
+      for a tuple of named tuples, None for a number.
+    - ``tape`` (Tape)
+    - ``inputs`` (sequence of int): Places of all components of the arguments, in order.
+    - ``results`` (sequence of int): Places of the values.
+    - ``single`` (bool): It returns a number, not a tuple.
     """
 
     def __init__(

@@ -45,15 +45,11 @@ class Operation(NamedTuple):
 class Tape:
     """Recorded operations.
 
-    Attributes
-    ----------
-    operations : list of Operation
-    arrays : optional
-        NumPy for recorded numbers, `contin.functions.recorded_arrays.NUMPY`: ``arrays.universal(...)``,
-        ``arrays.function(...)``.
-    decide : callable, optional
-        ``decide(condition)`` returns the outcome that the present recording assumes where a function asks for the truth of a
-        number. Without it such a question raises `Unrecordable`.
+    - ``operations`` (list of Operation)
+    - ``arrays`` (optional): NumPy for recorded numbers, `contin.functions.recorded_arrays.NUMPY`: ``arrays.universal(...)``,
+      ``arrays.function(...)``.
+    - ``decide`` (callable, optional): ``decide(condition)`` returns the outcome that the present recording assumes where a
+      function asks for the truth of a number. Without it such a question raises `Unrecordable`.
 
     Examples
     --------
@@ -463,14 +459,9 @@ def _within(text: _Text, binds: int) -> str:
 class Table:
     """A piecewise polynomial of one number.
 
-    Attributes
-    ----------
-    breaks : tuple of float
-        m places, increasing. Piece j holds from break j - 1 (included) to break j.
-    origins : tuple of float
-        Of the m + 1 pieces: powers are of x - origin.
-    coefficients : tuple of tuple of float
-        Of each piece, the highest power first.
+    - ``breaks`` (tuple of float): m places, increasing. Piece j holds from break j - 1 (included) to break j.
+    - ``origins`` (tuple of float): Of the m + 1 pieces: powers are of x - origin.
+    - ``coefficients`` (tuple of tuple of float): Of each piece, the highest power first.
     """
 
     breaks: tuple[float, ...]

@@ -44,17 +44,13 @@ class Blocks(NamedTuple):
 
     It is square: n + n_bc + r = 2 n + k.
 
-    Attributes
-    ----------
-    local : ndarray, shape (N, n d, n (d + 1) + k)
-        L: collocation rows; rows and columns of each block are in the order of its `Layout`. Factoring overwrites it.
-    border : ndarray, shape (N, r, n (d + 1) + k)
-        B: each interval's share of the border rows (integral conditions, arclength, ...), in the same columns. The last k
-        columns are work space. Factoring overwrites it.
-    corner : ndarray, shape (r, k)
-        C: border rows, by the parameters. Factoring overwrites it.
-    first, last : ndarray, shapes (n_bc, n) and (n_bc, n + k)
-        F and E: boundary conditions, by the first mesh point, and by [the last one | parameters].
+    - ``local`` (ndarray, shape (N, n d, n (d + 1) + k)): L: collocation rows; rows and columns of each block are in the order
+      of its `Layout`. Factoring overwrites it.
+    - ``border`` (ndarray, shape (N, r, n (d + 1) + k)): B: each interval's share of the border rows (integral conditions,
+      arclength, ...), in the same columns. The last k columns are work space. Factoring overwrites it.
+    - ``corner`` (ndarray, shape (r, k)): C: border rows, by the parameters. Factoring overwrites it.
+    - ``first``, ``last`` (ndarray, shapes (n_bc, n) and (n_bc, n + k)): F and E: boundary conditions, by the first mesh point,
+      and by [the last one | parameters].
     """
 
     local: Stack
@@ -78,23 +74,14 @@ class Layout(NamedTuple):
     When the groups before it are eliminated, the rows of a group have entries in its own interior columns, and in one range
     of columns that begins with its own ends.
 
-    Attributes
-    ----------
-    order : ndarray, shape (n,)
-        States in the order of elimination, group by group.
-    offsets : ndarray, shape (G + 1,)
-        First places of the groups in ``order``, and n.
-    follows : ndarray, shape (G G,)
-        Entry g G + h is 1 if equations of group h contain states of group g.
-    rows : ndarray, shape (n d,)
-        Equation of each row, as i n + a for Gauss point i and state a. The rows of a group stand together, by Gauss points.
-        Those of its last Gauss point remain when its interior unknowns are eliminated.
-    inside : ndarray, shape (n (d - 1),)
-        Unknown of each interior column, as i n + a for node i and state a.
-    ends : ndarray, shape (2 n,)
-        Unknown of each column of the ends (nodes 0 and d), likewise.
-    starts : ndarray, shape (G, d + 1)
-        The first column of each group at each node.
+    - ``order`` (ndarray, shape (n,)): States in the order of elimination, group by group.
+    - ``offsets`` (ndarray, shape (G + 1,)): First places of the groups in ``order``, and n.
+    - ``follows`` (ndarray, shape (G G,)): Entry g G + h is 1 if equations of group h contain states of group g.
+    - ``rows`` (ndarray, shape (n d,)): Equation of each row, as i n + a for Gauss point i and state a. The rows of a group
+      stand together, by Gauss points. Those of its last Gauss point remain when its interior unknowns are eliminated.
+    - ``inside`` (ndarray, shape (n (d - 1),)): Unknown of each interior column, as i n + a for node i and state a.
+    - ``ends`` (ndarray, shape (2 n,)): Unknown of each column of the ends (nodes 0 and d), likewise.
+    - ``starts`` (ndarray, shape (G, d + 1)): The first column of each group at each node.
     """
 
     order: IndexVector

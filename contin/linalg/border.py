@@ -64,14 +64,10 @@ class Solves(Protocol):
 class Bordered:
     """A bordered matrix, factored.
 
-    Parameters
-    ----------
-    factors : Solves
-        Of the bordered matrix. Other equations may stand between those of A and the rows c: their right sides are zero.
-    shape : tuple of int
-        Numbers of equations and of unknowns of A.
-    columns, rows, held : int
-        Numbers of columns b and rows c, and of other rows before these.
+    - ``factors`` (Solves): Of the bordered matrix. Other equations may stand between those of A and the rows c: their right
+      sides are zero.
+    - ``shape`` (tuple of int): Numbers of equations and of unknowns of A.
+    - ``columns``, ``rows``, ``held`` (int): Numbers of columns b and rows c, and of other rows before these.
 
     Examples
     --------
@@ -126,18 +122,11 @@ def null_vectors(
 ) -> tuple[Bordered, Borders]:
     """Return the bordered matrix with borders that fit its null vectors, and these borders.
 
-    Parameters
-    ----------
-    bordered : callable
-        ``bordered(b, c)`` returns the matrix with these borders.
-    shape : tuple of int
-        Lengths of b and c.
-    borders : pair of ndarray, optional
-        Those to begin with; random ones by default.
-    weights : ndarray, shape (unknowns,)
-        Of the inner product in which c is a vector.
-    single : callable
-        Returns the left and the right null vector, which may be complex.
+    - ``bordered`` (callable): ``bordered(b, c)`` returns the matrix with these borders.
+    - ``shape`` (tuple of int): Lengths of b and c.
+    - ``borders`` (pair of ndarray, optional): Those to begin with; random ones by default.
+    - ``weights`` (ndarray, shape (unknowns,)): Of the inner product in which c is a vector.
+    - ``single`` (callable): Returns the left and the right null vector, which may be complex.
     """
     if borders is None:
         random = generator("border")
@@ -261,14 +250,9 @@ def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2
 class ReplacedRows:
     """Solves with the wanted matrix, and with its transpose.
 
-    Parameters
-    ----------
-    factors : Factors
-        Of M.
-    solutions : ndarray, shape (m, size + columns)
-        Those for the last m unit vectors: D and E, as rows.
-    rows : ndarray, shape (m - columns, size)
-        T.
+    - ``factors`` (Factors): Of M.
+    - ``solutions`` (ndarray, shape (m, size + columns)): Those for the last m unit vectors: D and E, as rows.
+    - ``rows`` (ndarray, shape (m - columns, size)): T.
 
     Examples
     --------

@@ -509,14 +509,9 @@ class Factorization:
     Vectors of unknowns are [mesh and interior values in order | parameters]; vectors of equations are
     [collocation | boundary | border rows]. Raises ValueError if the matrix is not square.
 
-    Parameters
-    ----------
-    layout : Layout
-        Order of rows and columns in an interval's block.
-    blocks : Blocks
-        The matrix; ``local``, ``border`` and ``corner`` are overwritten.
-    whole : Share, optional
-        Its segments; by default as many as suit its size.
+    - ``layout`` (Layout): Order of rows and columns in an interval's block.
+    - ``blocks`` (Blocks): The matrix; ``local``, ``border`` and ``corner`` are overwritten.
+    - ``whole`` (Share, optional): Its segments; by default as many as suit its size.
     """
 
     def __repr__(self) -> str:

@@ -20,19 +20,14 @@ from contin.linalg.vector import PANEL, Rows, at, copy_rows
 class Eliminated(NamedTuple):
     """The eliminated matrix: triangles, multipliers and pivots of the three stages, for the sizes of `Blocks`.
 
-    Attributes
-    ----------
-    local, border : ndarray
-        Stage 1: those of the `Blocks`, eliminated in place; drawn in `_eliminate_interiors`.
-    chain : ndarray, shape (N - 1, 2 n + r, 3 n + k)
-        Stage 2: the rows that contain a mesh point, drawn in `_eliminate_point`; not used where segments meet.
-    dense : ndarray, shape ((S + 1) n + k, (S + 1) n + k)
-        Stage 3: what is left of S segments, drawn in `_eliminate_dense`.
-    pivots : ndarray of int, shape (N, n d)
-        For each eliminated column the row in which its pivot was found, counted in the block: the interior columns of
-        interval j, then the n columns of mesh point j (not used where segments begin).
-    pivots_dense : ndarray of int, shape ((S + 1) n + k,)
-        The same for the columns of ``dense``.
+    - ``local``, ``border`` (ndarray): Stage 1: those of the `Blocks`, eliminated in place; drawn in `_eliminate_interiors`.
+    - ``chain`` (ndarray, shape (N - 1, 2 n + r, 3 n + k)): Stage 2: the rows that contain a mesh point, drawn in
+      `_eliminate_point`; not used where segments meet.
+    - ``dense`` (ndarray, shape ((S + 1) n + k, (S + 1) n + k)): Stage 3: what is left of S segments, drawn in
+      `_eliminate_dense`.
+    - ``pivots`` (ndarray of int, shape (N, n d)): For each eliminated column the row in which its pivot was found, counted in
+      the block: the interior columns of interval j, then the n columns of mesh point j (not used where segments begin).
+    - ``pivots_dense`` (ndarray of int, shape ((S + 1) n + k,)): The same for the columns of ``dense``.
     """
 
     local: Stack

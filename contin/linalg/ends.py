@@ -33,14 +33,12 @@ from contin.linalg.elimination import Eliminated
 class Relations(NamedTuple):
     """What condensation has left of a matrix.
 
-    Attributes
-    ----------
-    relations : ndarray, shape (N - S, n, 2 n + k)
-        Orthonormal rows that relate the first mesh point of a segment to each of the others in it, from the second on.
-    sides : ndarray, shape (N - S,)
-        On which side these rows are: 1 or -1, so that rows times it turn with the matrix, whatever the pivots are.
-    condensed : ndarray, shape ((S + 1) n + k, (S + 1) n + k)
-        The condensed matrix: S n rows R, boundary conditions and border.
+    - ``relations`` (ndarray, shape (N - S, n, 2 n + k)): Orthonormal rows that relate the first mesh point of a segment to each
+      of the others in it, from the second on.
+    - ``sides`` (ndarray, shape (N - S,)): On which side these rows are: 1 or -1, so that rows times it turn with the matrix,
+      whatever the pivots are.
+    - ``condensed`` (ndarray, shape ((S + 1) n + k, (S + 1) n + k)): The condensed matrix: S n rows R, boundary conditions and
+      border.
     """
 
     relations: Stack
@@ -258,17 +256,12 @@ def relations_of(
 ) -> Relations:
     """Return what condensation has left of a matrix.
 
-    Parameters
-    ----------
-    offsets : ndarray of int
-        Where the groups of states begin, as in `contin.linalg.blocks.Layout`.
-    factors : Eliminated
-    carried : ndarray, shape (S, n + r, 2 n + k)
-        The rows that relate both ends of each segment, and their share of the border.
-    first, last : ndarray, shape (n_bc, n) and (n_bc, n + k)
-        The boundary conditions.
-    starts : ndarray of int, shape (S + 1,)
-        The first intervals of the segments, and N.
+    - ``offsets`` (ndarray of int): Where the groups of states begin, as in `contin.linalg.blocks.Layout`.
+    - ``factors`` (Eliminated)
+    - ``carried`` (ndarray, shape (S, n + r, 2 n + k)): The rows that relate both ends of each segment, and their share of the
+      border.
+    - ``first``, ``last`` (ndarray, shape (n_bc, n) and (n_bc, n + k)): The boundary conditions.
+    - ``starts`` (ndarray of int, shape (S + 1,)): The first intervals of the segments, and N.
     """
     n = first.shape[1]
     found = Relations.unfilled(len(factors.local), n, carried.shape[2] - 2 * n, len(carried))

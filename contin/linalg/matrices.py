@@ -58,9 +58,7 @@ class DenseFactors:
 
     Raises ValueError if the matrix is not square.
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (n, n)
+    - ``matrix`` (ndarray, shape (n, n))
 
     Examples
     --------
@@ -136,13 +134,9 @@ class SparseFactors:
 
     Raises ValueError if the matrix is not square.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse array, shape (n, n)
-    borders : int
-        So many rows at the end are dense.
-    solver : callable, optional
-        Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
+    - ``matrix`` (scipy.sparse array, shape (n, n))
+    - ``borders`` (int): So many rows at the end are dense.
+    - ``solver`` (callable, optional): Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
 
     Examples
     --------
@@ -237,11 +231,8 @@ def rightmost(matrix: Any, solver: Function | None = None) -> ComplexArray:
     exactly for the z with Re z > -d, so that Arnoldi's method finds these first (Meerbergen, Spence and Roose 1994). Its shifts
     s come from the eigenvalues that are nearest to zero. Eigenvalues far left of the axis are not looked for.
 
-    Parameters
-    ----------
-    matrix : scipy.sparse array, shape (n, n)
-    solver : callable, optional
-        Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
+    - ``matrix`` (scipy.sparse array, shape (n, n))
+    - ``solver`` (callable, optional): Factors a matrix, see `contin.AlgebraicProblem`; SciPy's SuperLU by default.
 
     Returns
     -------
@@ -276,13 +267,10 @@ def rightmost(matrix: Any, solver: Function | None = None) -> ComplexArray:
 def rightmost_of(inverse: Function, n: int, size: float, largest: float = math.inf) -> ComplexArray:
     """Return the same eigenvalues of an operator A that is known by its inverses, as in `rightmost`.
 
-    Parameters
-    ----------
-    inverse : callable
-        ``inverse(s)`` returns the function v -> (A - s)^-1 v of vectors (n,); it raises RuntimeError where there is none.
-    n : int
-    size, largest : float
-        A size of A: zero is looked at from a billionth of it. The largest shift.
+    - ``inverse`` (callable): ``inverse(s)`` returns the function v -> (A - s)^-1 v of vectors (n,); it raises RuntimeError
+      where there is none.
+    - ``n`` (int)
+    - ``size``, ``largest`` (float): A size of A: zero is looked at from a billionth of it. The largest shift.
     """
     found = [_transformed(inverse, n, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
     scale = float(np.abs(found[0]).max(initial=0.0)) or 1.0

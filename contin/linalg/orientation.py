@@ -67,12 +67,8 @@ def canonical_basis(vectors: Array, weights: Array | float = 1.0) -> Array:
     It consists of the projections of unit vectors onto the space, each made orthogonal to those before it: first the one with
     the largest projection (`pivot`), then the one of which most is left, and so on.
 
-    Parameters
-    ----------
-    vectors : ndarray, shape (count, size)
-        Linearly independent.
-    weights : ndarray, shape (size,), or float
-        Of the inner product.
+    - ``vectors`` (ndarray, shape (count, size)): Linearly independent.
+    - ``weights`` (ndarray, shape (size,), or float): Of the inner product.
 
     Examples
     --------

@@ -124,11 +124,9 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
     and the eigenvalues are the product of the numbers a_j, which must be positive, and those of the product of the B_j. What
     the factors leave of the zeros is round-off and dropped: it would grow with the product.
 
-    Parameters
-    ----------
-    factors : ndarray, shape (N, n, n)
-    vectors : ndarray, shape (N + 1, n)
-        v_0 ... v_N, of any length; the last is a positive multiple of the first. Where one is zero, all eigenvalues are NaN.
+    - ``factors`` (ndarray, shape (N, n, n))
+    - ``vectors`` (ndarray, shape (N + 1, n)): v_0 ... v_N, of any length; the last is a positive multiple of the first. Where
+      one is zero, all eigenvalues are NaN.
 
     Examples
     --------
