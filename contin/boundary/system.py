@@ -258,7 +258,7 @@ class Collocation(Composed):
 
     def _with(self, **changes: object) -> Self:
         """Return the same with other free parameters, parameters or scales, and with the same reference."""
-        other, known = super()._with(**changes)._with_pieces(self._pieces), self.reference
+        other, known = super()._with(**changes).with_pieces(self._pieces), self.reference
         if known.size:
             other._refer(other.pack(self.states(known), dict(zip(self.problem.parameters, self.all_parameters(known)))))
         return other
@@ -303,7 +303,7 @@ class Collocation(Composed):
             self._last_crossings = self._once("crossings", x, lambda: crossings(self, self._field, x))
         return self._last_crossings
 
-    def _with_pieces(self, pieces: tuple[Array, Array] | None) -> Self:
+    def with_pieces(self, pieces: tuple[Array, Array] | None) -> Self:
         """Return the same with other frozen outcomes."""
         if pieces is None and self._pieces is None:
             return self
@@ -319,7 +319,7 @@ class Collocation(Composed):
         """Return the same with mesh points and frozen outcomes where the equations jump along x, and x; else itself."""
         if self.outcomes.size and not self.contradicts(x):
             return self, x
-        system = self._with_pieces(None)
+        system = self.with_pieces(None)
         if not system.switching(x).jumps.any() or not any(name == "field" for name, _ in self._selections):
             return system, x
         system, carry = system.on_switches(x) or (system, np.array)
@@ -328,7 +328,7 @@ class Collocation(Composed):
         changes = np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1
         if not changes.size:
             return system, x
-        return system._with_pieces((system.mesh[changes], sides[[0, *changes]])), x
+        return system.with_pieces((system.mesh[changes], sides[[0, *changes]])), x
 
     def check_jumps(self, x: Array, state: State, settled: bool = True) -> None:
         """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations.
@@ -355,7 +355,7 @@ class Collocation(Composed):
         """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""
         mesh, at, after = stepped(self, x, change)
         assert self._pieces is not None
-        other = self._with_pieces((at, self._pieces[1]))
+        other = self.with_pieces((at, self._pieces[1]))
         return other.on_mesh(mesh)[0], after
 
     def contradicts(self, x: Array) -> bool:
@@ -695,7 +695,7 @@ class Collocation(Composed):
             return None
         system = self
         if self._pieces is not None:
-            system = self._with_pieces((next_places(self, x), self._pieces[1]))
+            system = self.with_pieces((next_places(self, x), self._pieces[1]))
         return system.on_mesh(moved_to_breaks(self.mesh, breaks))
 
     def _all_breaks(self, x: Array, closely: bool) -> Array:
@@ -764,8 +764,9 @@ class Collocation(Composed):
 
     @property
     def stored(self) -> dict[str, Array]:
-        """Mesh, parameters and sizes."""
-        return {"mesh": self.mesh, **self._own_arrays}
+        """Mesh, parameters and sizes, and frozen outcomes."""
+        pieces = {} if self._pieces is None else dict(zip(("jumps", "outcomes"), self._pieces))
+        return {"mesh": self.mesh, **self._own_arrays, **pieces}
 
     def referring_to(self, x: Array, tangent: Array) -> Self:
         """Return the same with a solution as the reference, where the kind has one."""
@@ -773,7 +774,7 @@ class Collocation(Composed):
 
     def explained(self, stop: Stop, trial: Trial) -> Stop:
         """Return the end of a run at a jump, with the conditions and times."""
-        if not self.outcomes.size or stop.event not in ("grazing", "sliding"):
+        if not self.outcomes.size or stop.message not in ("met grazing", "met sliding"):
             return stop
         found, why = crossing_places(self, trial.x), clearance(self, trial.x)
         jumps = ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))

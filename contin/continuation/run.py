@@ -217,16 +217,16 @@ class Continuation:
             step = self._step(self.state)
         except ConvergenceError as error:
             here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
-            if isinstance(error, Grazing):
-                self.stop = Stop(Reason.EVENT, str(error), event="grazing")
-                yield self._point(SpecialPoint(0.0, Label.GRAZING, "grazing", here), self.state, accuracy=self._accuracy)
-                return
             failed = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
+            grazes = isinstance(error, Grazing)
+            failed = Stop(Reason.EVENT, str(error), event="grazing") if grazes else failed
             stop = self.state.system.explained(failed, here)
             if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
                 return
             self.stop = stop
-            label, name = (Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
+            label, name = (
+                (Label.GRAZING if grazes else Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
+            )
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
         if isinstance(step, SpecialPoint):

@@ -360,7 +360,7 @@ class PeriodicCollocation(OfCycles, Collocation):
         places, (first, last) = [self.mesh[each.node] for each in self.crossings(x)], self.mesh[[0, -1]]
         if not error.at_end or min(places[0] - first, last - places[-1]) > ROUGH * (last - first):
             return None
-        other = self._with_pieces(None)
+        other = self.with_pieces(None)
         other._round = self._jumps(x)
         return other
 
@@ -559,7 +559,7 @@ class CycleCollocation(PeriodicCollocation):
     def crossed(self, x: Array) -> tuple[CycleCollocation, Array]:
         """Return the same with frozen outcomes where a cycle crosses jumps, and the cycle begun far from all of them."""
         if not self.outcomes.size and self.switching(x).jumps.any():
-            places = self.switching(x).places
+            places = np.append(0.0, self.switching(x).places)  # one at the ends is not seen
             gaps = np.diff(places, append=places[0] + 1)
             shift = float((places + gaps / 2)[gaps.argmax()])
             return super(CycleCollocation, self.with_reference(self.moved(x, shift))).crossed(self.moved(x, shift))

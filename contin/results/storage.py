@@ -273,7 +273,9 @@ def _system(problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, An
     sizes = {name.removeprefix("scale_").removesuffix(str(i)): array for name, array in arrays.items()
              if name.startswith("scale_") and name.rstrip("0123456789") + str(i) == name}  # fmt: skip
     scales = Scales.of_arrays(sizes) if sizes else None
-    base = problem.discretized(head["free"], values, scales, arrays.get(f"mesh{i}", ()), head["degrees"][i])
+    base: Any = problem.discretized(head["free"], values, scales, arrays.get(f"mesh{i}", ()), head["degrees"][i])
+    if f"jumps{i}" in arrays:
+        base = base.with_pieces((arrays[f"jumps{i}"], arrays[f"outcomes{i}"]))
     if not head["curves"]:
         return base
     kind, size = head["curves"][i]

@@ -198,13 +198,7 @@ def solved(
 def _crossed(
     system: System, x: Array, corrected: Callable[[System, Array], Corrected], held: str | None
 ) -> tuple[System, Corrected]:
-    """Return the solution near x on a mesh with points where conditions on states switch, with outcomes frozen at jumps.
-
-    Raises
-    ------
-    ConvergenceError
-        Outcomes go round.
-    """
+    """Return the solution near x on a mesh with points where conditions on states switch, with outcomes frozen at jumps."""
     told = ""
     for _ in range(ROUNDS):
         system, x = _moved(*system.crossed(x), held)
@@ -216,9 +210,12 @@ def _crossed(
             raise ConvergenceError(f"{error}; {told}") from None
         other, x = system.crossed(done.x)
         if other is system:
+            found = system.switching(done.x)
+            if not system.outcomes.size and (found.jumps & ~found.settled).any():
+                break  # at an end, or where the solution only touches it
             return system, done
         system, told = other, _jumps(system, done.x)
-    raise ConvergenceError(f"no sequence of jumps fits a solution; {told}")
+    raise ConvergenceError(f"no sequence of jumps fits a solution; {told or _jumps(system, done.x)}")
 
 
 def _jumps(system: Any, x: Array) -> str:
@@ -231,21 +228,15 @@ def _jumps(system: Any, x: Array) -> str:
 
 
 def _moved(system: Any, x: Array, held: str | None) -> tuple[Any, Array]:
-    """Return a guess with its crossings where Newton's method takes them, up to what one correction on a mesh leaves.
-
-    Raises
-    ------
-    ConvergenceError
-    """
-    for _ in range(MOST_UPDATES if system.outcomes.size else 0):
+    """Return a guess with its crossings where Newton's method takes them, up to what one correction on a mesh leaves."""
+    step = np.full(MOST_UPDATES if system.outcomes.size else 0, np.inf)
+    for _ in step:
         rows = [] if held is None else [np.eye(1, system.size, system.parameter_index(held))[0]]
         residual, factors = system.linearize(x, rows)
         step = -factors.solve(np.append(residual, np.zeros(len(rows))))
-        if not np.isfinite(step).all():
+        if not ROUGH < np.abs(step / (1 + np.abs(x))).max() < np.inf:
             break
         system, x = system.stepped(x, step)
-        if np.abs(step / (1 + np.abs(x))).max() <= ROUGH:
-            break
     return system, x
 
 

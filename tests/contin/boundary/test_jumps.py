@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import contin
@@ -145,6 +146,14 @@ def test_a_relay_and_its_multipliers():
         assert np.allclose(np.sort(np.exp(point.system.eigenvalues(point.x)).real), np.sort(multipliers), rtol=0, atol=1e-7)
 
 
+def test_a_stored_cycle_keeps_its_multipliers(tmp_path):
+    problem = contin.CycleProblem(welander, ["T", "S"], {"a": 1.2, "e": -0.01})
+    branch = contin.trace(contin.cycle(problem, [0.5, 0.5]), free=["e", "period"], limits={"e": (-0.011, 0)}, max_points=3)
+    contin.save(branch, tmp_path / "b.npz")
+    for point, again in zip(branch, contin.load(problem, tmp_path / "b.npz")):
+        assert np.array_equal(point.system.eigenvalues(point.x), again.system.eigenvalues(again.x))
+
+
 def test_a_threshold_that_is_touched_is_located():
     """u'' = -q - .3 [u > .1] - .3 [u > .3]: the largest u reaches .3 where the times below and above .1 are 1 / 2."""
     problem = contin.BoundaryValueProblem(
@@ -212,3 +221,39 @@ def test_a_jump_that_passes_the_end_of_the_period():
     assert [point.label for point in branch if point.label] == ["EP", "SL"] and end["v0"] > 2.5
     sticking = [each for each in end.system.crossings(end.x) if abs(min(each.rates)) < 1e-6]
     assert len(sticking) == 1
+
+
+@pytest.mark.parametrize("seed", [9, 17, 46])
+def test_random_relays(seed):
+    """x' = A x - b sign(c.x): half a period h with x(h) = -x(0), by matrix exponentials. The guess begins at a jump."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(2, 5))
+    a = random.normal(size=(n, n))
+    a -= (np.linalg.eigvals(a).real.max() + random.uniform(0.1, 0.5)) * np.eye(n)
+    b, c, one = random.normal(size=n), random.normal(size=n), np.eye(n)
+
+    def first(h):
+        grown = expm(a * h)
+        return np.linalg.solve(grown + one, (grown - one) @ np.linalg.solve(a, b))
+
+    lengths = np.linspace(0.02, 20, 1500)
+    values = np.array([c @ first(h) for h in lengths])
+    at = int(np.flatnonzero(values[1:] * values[:-1] < 0)[0])
+    h = brentq(lambda h: c @ first(h), lengths[at], lengths[at + 1], xtol=1e-14)
+    z = first(h)
+    before, behind = -a @ z - b, -a @ z + b
+    half = (one + np.outer(behind - before, c) / (c @ before)) @ expm(a * h)
+
+    def guess(t):
+        side, t = (1, 2 * h * t) if t < 0.5 else (-1, h * (2 * t - 1))
+        grown = expm(a * t)
+        return side * (grown @ z - (grown - one) @ np.linalg.solve(a, b)) * (1 + 0.05 * math.cos(3 * t))
+
+    def field(u, p):
+        return tuple(a @ np.array([*u]) - b * (1.0 if c @ np.array([*u]) > p.e else -1.0))
+
+    problem = contin.CycleProblem(field, [f"x{i}" for i in range(n)], {"e": 0.0})
+    cycle = contin.solve(problem, guess, {"period": 2.1 * h})
+    assert abs(cycle["period"] / (2 * h) - 1) < 1e-9
+    found = np.exp(cycle.system.eigenvalues(cycle.x))
+    assert all(abs(found - value).min() < 1e-6 for value in np.linalg.eigvals(half @ half))
