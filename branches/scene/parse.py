@@ -223,6 +223,8 @@ def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
         text, told = missing(absent), len(absent)
     elif kind == "value_error":
         text = f"{where}: {message}" if where else message
+    elif kind == "invalid_key" or (first["loc"][-1:] == ("[key]",) and not isinstance(first["input"], str)):
+        text = f"{where}: names of fields are words, not {show(first['input'])}; a number has a decimal point, as in 1.2"
     elif kind in ("model_type", "dict_type"):
         text = f"{where}: must hold `key: value` fields, not {show(first['input'])}"
     else:

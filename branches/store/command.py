@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import functools
 import os
+import re
 import sys
 from collections.abc import Callable
 
@@ -32,6 +33,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(typed(command), allow_abbrev=False, description=description, epilog=epilog)
         self.register("type", float, Quantity(""))
         self.register("type", int, _whole)
+        self._negative_number_matcher = re.compile(r"-(\.?\d|inf)")  # -30mm is a value, too
 
     def parse_args(self, args=None, namespace=None):
         """Return the options; a mistyped one is named before those that are then missing."""

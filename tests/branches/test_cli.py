@@ -55,6 +55,12 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
+def test_a_negative_number_with_a_unit_is_a_value(call):
+    words = ["--width", "5mm", "--thickness", "0.1mm", "--length", "1m", "--poisson-ratio", "0.3", "--youngs-modulus", "1GPa"]
+    done = call(cli.main, "strip", *words, "--natural-radius", "-30mm")
+    assert done.returncode == 2 and "natural_radius: -0.03 must be positive" in done.err
+
+
 @pytest.mark.full
 def test_a_mistake_is_answered_with_what_to_type(command):
     said = command("run", "m1_n2", "nu=0.2", program=PROGRAM).err
