@@ -175,7 +175,7 @@ def runs_away(now: Scales, then: Scales) -> bool:
     return bool(np.append(now.states / then.states, now.parameters / then.parameters).max() > _FAR)
 
 
-def _nears(trial: Trial, state: State, limits: tuple[float, float], primary: str) -> bool:
+def _nears(trial: Trial, state: State, limits: Sequence[float], primary: str) -> bool:
     """Return whether the primary parameter goes to a limit, and not to zero or to a value before it as states grow."""
     value, place = trial[primary], trial.system.parameter_index(primary)
     size = trial.system.free_scales[place - trial.system.state_size]
