@@ -26,6 +26,9 @@ from contin.linalg.condensation import Factorization
 from contin.linalg.convergence import CHORD, CHORDS, CONVERGED, DIVERGES, STAGNATES, judge_update, subtract
 from contin.text import shown
 
+#: Part of an update that must change the next one by half of that part at least. Ten times larger, strongly nonlinear equations
+#: count as noise; a thousand times smaller, what is left of an update above the tolerance would.
+_PART = 1e-3
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.
 UNITS = 30
@@ -220,8 +223,10 @@ def _settled(
     """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
     An unknown that is zero has no size: its updates vanish much faster than they become small. What is left of it is round-off
-    of the iterate before. An update that is round-off is not made: where the matrix is nearly singular, it leads away. Raises
-    ConvergenceError where it does not become so; the message holds the last updates, relative to these sizes.
+    of the iterate before. An update that is round-off is not made: where the matrix is nearly singular, it leads away. It is
+    so, too, where a small part of it does not change the next one by that part: of a map, f(u) - u is known to the round-off of
+    the largest state. Raises ConvergenceError where it does not become so; the message holds the last updates, relative to
+    these sizes.
     """
     rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
     noise = np.zeros_like(x)
@@ -234,7 +239,11 @@ def _settled(
         least, count = newton.tolerance * np.maximum(sizes(x), before), len(updates) + len(relative)
         if np.all(np.abs(update) <= least):
             return Corrected(x, factors, count, subtract(x, update))
-        now = rounded_off(system, x, rows)
+        now, beside = rounded_off(system, x, rows), x - _PART * update
+        residual = system.residual(beside)
+        left = factors.solve(residual if row is None else np.append(residual, row @ beside - target)) - (1 - _PART) * update
+        strays = (2 * np.abs(left) > _PART * np.abs(update)) & (np.abs(update) <= sizes(x))
+        now = np.where(strays, np.maximum(now, np.abs(update)), now)
         if np.all(np.abs(update) <= np.maximum(least, UNITS * np.maximum(noise, now))):
             return Corrected(x, factors, count, float(np.max(np.abs(update) / (1 + np.abs(x)))))
         noise, before = now, sizes(update)

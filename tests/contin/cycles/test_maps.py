@@ -254,3 +254,14 @@ def test_a_diagram_keeps_branch_points_of_fixed_points_and_of_cycles_apart():
     found = contin.diagram(contin.solve(problem, [0.0, 0.0]), free=["r"], limits={"r": (-0.05, 0.6)}, depth=2)
     points = {(junction.point.label, junction.point["rounds"], round(junction.point["r"], 6)) for junction in found.junctions}
     assert points >= {("PD", 1, 0.146447), ("BP", 1, 0.0), ("BP", 1, 0.5), ("BP", 2, 0.25), ("BP", 2, 0.5)}
+
+
+@pytest.mark.parametrize("b", [1.0, 0.99, 0.9])
+def test_a_fixed_point_at_half_a_round_is_one(b):
+    """x' - x is known to the round-off of x = pi, and the momentum there is zero: no update of it is small relative to it."""
+    problem = contin.MapProblem(
+        lambda u, p: (u.x + p.b * u.y + p.K * math.sin(u.x), p.b * u.y + p.K * math.sin(u.x)), ["x", "y"], {"K": 0.5, "b": b}
+    )
+    for guess in ([math.pi, 0.0], [3.1, 0.01]):
+        point = contin.solve(problem, guess)
+        assert abs(point["x"] - math.pi) < 1e-12 and abs(point["y"]) < 1e-12
