@@ -234,6 +234,9 @@ def judge(frame: Frame, attempt: Attempt, control: Control, path: Path, number: 
     """Return whether a corrected point can be believed by itself; fill in what it is judged by."""
     _compare(frame, attempt, path, number)
     judged, tangent, new, new_tangent = attempt.judged, path.tangents[number - 1], path.x[number], path.tangents[number]
+    strays: float = _off(frame, attempt, path, number, step / 2)
+    if strays > _ASTRAY * control.accuracy * step:
+        judged[MISSED] = max(judged[MISSED], strays)
     if not (judged[TURN] <= control.angle and judged[MISSED] <= _ASTRAY * control.accuracy * step):
         return FAILED
     at = control.primary
@@ -252,25 +255,42 @@ def judge(frame: Frame, attempt: Attempt, control: Control, path: Path, number: 
 def _compare(frame: Frame, attempt: Attempt, path: Path, number: int) -> None:
     """Fill in what both ends of a step say of it, with the cosine between their tangents."""
     x, tangent, last, last_tangent = path.x[number - 1], path.tangents[number - 1], path.x[number], path.tangents[number]
-    judged, missed, whole, chord = attempt.judged, 0.0, 0.0, 0.0
+    judged, whole, chord = attempt.judged, 0.0, 0.0
     for i in range(x.size):
-        weight, gap, gone = frame.weights[i], attempt.guess[i] - last[i], last[i] - x[i]
-        missed += weight * gap * gap
-        whole += weight * tangent[i] * last_tangent[i]
-        chord += weight * gone * gone
-    part, first_size, last_size, of_states = 0.0, 0.0, 0.0, 0.0
+        whole += frame.weights[i] * tangent[i] * last_tangent[i]
+        chord += frame.weights[i] * (last[i] - x[i]) ** 2
+    part, first_size, last_size = 0.0, 0.0, 0.0
     for i in range(frame.states):
         weight, one, other = frame.weights[i], tangent[i], last_tangent[i]
         part += weight * one * other
         first_size += weight * one * one
         last_size += weight * other * other
-        of_states += weight * (attempt.guess[i] - last[i]) ** 2
-    if of_states > APART * APART:
-        missed = max(missed, of_states / (_LOOSE * _LOOSE * max(first_size, last_size) + TINY))
     sizes = math.sqrt(first_size), math.sqrt(last_size)
     cosine = part / (sizes[0] * sizes[1]) if min(sizes[0], sizes[1]) > _RESTS else 1.0
-    judged[MISSED], judged[LENGTH], judged[COSINE] = math.sqrt(missed), math.sqrt(chord), whole
-    judged[TURN] = max(_angle(whole), _angle(cosine) / 2)
+    judged[LENGTH], judged[COSINE], judged[TURN] = math.sqrt(chord), whole, max(_angle(whole), _angle(cosine) / 2)
+    judged[MISSED] = _off(frame, attempt, path, number, 0.0)
+
+
+@helper
+def _off(frame: Frame, attempt: Attempt, path: Path, number: int, half: float) -> float:
+    """Return how far a step ends from its prediction or, with ``half`` a step, from where the tangents at both ends lead.
+
+    That is the trapezoidal rule: of a smooth branch it misses less than the prediction. Where Newton's method falls onto a
+    branch that crosses this one nearby, only the tangent may tell.
+    """
+    x, tangent, last, last_tangent = path.x[number - 1], path.tangents[number - 1], path.x[number], path.tangents[number]
+    missed, of_states, first_size, last_size, cosine = 0.0, 0.0, 0.0, 0.0, attempt.judged[COSINE]
+    for i in range(x.size):
+        aim = attempt.guess[i] if half == 0 else x[i] + half * (tangent[i] + last_tangent[i] / cosine)
+        missed += frame.weights[i] * (aim - last[i]) ** 2
+        if i == frame.states - 1:
+            of_states = missed
+        if i < frame.states:
+            first_size += frame.weights[i] * tangent[i] ** 2
+            last_size += frame.weights[i] * last_tangent[i] ** 2
+    if of_states > APART * APART:
+        missed = max(missed, of_states / (_LOOSE * _LOOSE * max(first_size, last_size) + TINY))
+    return math.sqrt(missed)
 
 
 @helper

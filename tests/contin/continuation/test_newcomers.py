@@ -74,3 +74,12 @@ def test_symmetries_are_functions_of_times_and_states():
     problem = contin.AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
     with pytest.raises(contin.ProblemError, match=r"symmetries: .* must take 2 arguments, times \(K,\) and states \(K, n\)"):
         contin.diagram(contin.solve(problem, [0.0]), free=["a"], symmetries=[lambda u: -u])
+
+
+@pytest.mark.parametrize("capacity, start", [(0.5, 2.0), (0.1, 1.5), (0.02, 2.0)])
+def test_a_population_dies_out_at_a_branch_point(capacity, start):
+    """r x (1 - x/K) = x: x = K (1 - 1/r) crosses x = 0 at r = 1, and a step from r = 1.35 to 0.97 ended on x = 0."""
+    growth = contin.AlgebraicProblem(lambda u, p: (p.r * u.x * (1 - u.x / capacity) - u.x,), ["x"], {"r": start})
+    branch = contin.trace(contin.solve(growth, [capacity * (1 - 1 / start)]), free=["r"], direction=-1, limits={"r": (0.5, 3)})
+    assert [point.label for point in branch if point.label] == ["EP", "BP", "EP"]
+    assert abs(branch.labelled("BP")[0]["r"] - 1) < 1e-9 and abs(branch[-1]["x"] / capacity + 1) < 1e-9
