@@ -71,6 +71,8 @@ def _check(asked: dict, natural_radius: float | None) -> None:
     for name in ("yield_strain", "want"):
         if asked[name] is not None and not 0 < asked[name] < math.inf:
             raise ValueError(f"{name}: {asked[name]:g} must be positive and finite")
+    if asked["push_at"] is not None and not 0 < asked["push_at"] < 1:
+        raise ValueError(f"push_at: {asked['push_at']:g} must be above 0 and below 1")
     turns = asked["turns"]
     if turns is not None and not (turns % 2 and 1 <= turns <= MOST_COVERINGS):
         raise ValueError(f"turns: {turns} must be odd, from 1 to {MOST_COVERINGS}: a loop cannot be folded into others")

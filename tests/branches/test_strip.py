@@ -257,7 +257,7 @@ def test_options_of_closed_strips_are_not_of_open_ones(call):
         (["--ends", "hinged", "--natural-radius", "1"], "ends: is of open strips"),
         (["--distance", ".39", "--turns", "3"], "turns: is of closed strips"),
         (["--distance", ".5"], "distance: 0.5 m must be from 0.24 m to below the length, 0.4 m"),
-        (["--distance", ".39", "--push-at", "1.5"], "roller.at: must be below 1, not 1.5"),
+        (["--distance", ".39", "--push-at", "1.5"], "push_at: 1.5 must be above 0 and below 1"),
     ):
         done = call(main, *given, *more)
         assert done.returncode == 2 and said in done.err and done.err.count("\n") == 1
