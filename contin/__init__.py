@@ -21,7 +21,7 @@ import lazy_loader
 from contin.errors import warn
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 #: Modules to which names have moved that were here in version 0.2, and new names of others; the old ones stay for one version,
