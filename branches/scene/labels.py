@@ -56,7 +56,7 @@ TRIVIAL = "trivial branch"
 #: The name of an end where a secondary branch meets a primary one.
 PRIMARY = "primary branch"
 #: Labels of points at which the pieces of a branch begin and end.
-SPECIAL = ("LP", "BP", "SB", "EP", "MX")
+SPECIAL = ("LP", "BP", "SB", "BC", "EP", "MX")
 #: Marks of kinds in diagrams: marker, colour, size, words; the words of an end are those of its point.
 MARKS = {
     "circle": ("o", END, 16, "bifurcation of a circle"), "fold": ("*", FOLD, 110, "fold"),

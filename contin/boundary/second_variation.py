@@ -164,7 +164,8 @@ def lies_flat(number: int, name: str) -> Event:
         system, n, p = trial.system, trial.system.problem.dimension, trial.system.all_parameters(trial.x)
         ends, batch, field = system.states(trial.x)[[0, -1]], system.unscaled, system.problem.batch("field")
         inside = system.states_at_gauss_points(trial.x)
-        largest = np.abs(field.values(system.gauss_times, inside, inside[:0], p)[:, :n]).max(axis=0)
+        rates_inside = field.values(system.gauss_times, inside, inside[:0], p)[:, :n]
+        largest = np.abs(rates_inside).max(axis=0)
 
         def at(s: float, end: int, along: Array) -> tuple[Array, Array]:
             there = ends + s * along
@@ -175,7 +176,8 @@ def lies_flat(number: int, name: str) -> Event:
         for end in (0, 1):
             along = np.zeros_like(ends)
             along[end], row = at(0.0, end, along)
-            if row.any() and abs(row @ along[end, :n]) <= APART * np.abs(row) @ largest:
+            is_bent = np.ptp(rates_inside @ row) > APART * np.abs(row).max()  # the curvature of a straight strip is round-off
+            if is_bent and abs(row @ along[end, :n]) <= APART * np.abs(row) @ largest:
                 return float(derivative(lambda s: np.dot(*(each[:n] for each in at(s, end, along))))[0])  # noqa: B023
         return 1.0
 

@@ -227,7 +227,8 @@ class Continuation:
             label, name = (
                 (Label.GRAZING if grazes else Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
             )
-            yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
+            found = SpecialPoint(0.0, label, name, here, is_located=not grazes)  # it lies within a step that failed
+            yield self._point(found, self.state, accuracy=self._accuracy)
             return
         if isinstance(step, SpecialPoint):
             self.stop = step.stop

@@ -166,7 +166,10 @@ def test_a_threshold_that_is_touched_is_located():
         return (first - there) / q + math.sqrt(0.4 / (q + 0.3)) - 0.5
 
     assert branch[-1].label == "GR" and "u.u > 0.3" in branch.stop.message
-    assert abs(branch[-1]["q"] - brentq(excess, 1, 3, xtol=1e-14)) < 1e-10
+    within = 1e-10 if branch[-1].errors else 1e-6  # not located, it has no error: it lies within the least step
+    assert abs(branch[-1]["q"] - brentq(excess, 1, 3, xtol=1e-14)) < within and ("possible" in str(branch[-1])) is (
+        within == 1e-6
+    )
 
 
 def test_corners_may_come_and_go():
