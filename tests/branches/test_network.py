@@ -579,7 +579,7 @@ def test_rollers_that_come_and_go(run):
 
 @pytest.mark.full
 def test_a_table_has_a_column_once():
-    text = "material: {law: flat rod, nu: 0.3}\nstrips: {one: {begin: [0, 0, 0], end: [0, 1, 0]}}\n"
+    text = "material: {law: flat rod, nu: 0.3}\nstrips: {one: {begin: [0, 0, 0], end: [0, 1, 0], normal: z}}\n"
     text += "joints: {A: [one start], B: [one finish]}\nheld: {A: clamped}\nloads: {P: {B: [0, -1, 0]}}\n"
     scene = parse(text + "stages: [{follow: P, to: 1}, {follow: kappa_n, to: 1}]\n", "scene")
     heads = [OpenStage(scene, number).head.split()[:-4] for number in (1, 2)]
