@@ -94,18 +94,24 @@ def outcomes(*given: Any) -> Array:
     return np.where(deciding(*given) >= 0, 1.0, -1.0)
 
 
+def changes(sides: Array) -> list[int]:
+    """Return the intervals, by number, that have other outcomes (N, K) than the one before."""
+    found: list[int] = (np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1).tolist()
+    return found
+
+
 def frozen(batch: Batch, sides: Array, degree: int) -> Piecewise:
     """Return functions at Gauss points with the outcomes ``sides`` (N, K) on the intervals."""
-    starts = np.flatnonzero(np.append(True, (sides[1:] != sides[:-1]).any(axis=1)))
+    starts = [0, *changes(sides)]
     every = range(len(batch.signature.parameters))
-    return Piecewise([batch.frozen(every, sides[j])[0] for j in starts], (degree * starts).tolist())
+    return Piecewise([batch.frozen(every, sides[j])[0] for j in starts], [degree * j for j in starts])
 
 
 def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
     """Return the crossings of a solution; ``batch`` is the field in scaled units."""
     n, sides, found = system.states_count, system.outcomes, list[Crossing]()
     every, later = range(len(system.parameters)), _LATER * (system.mesh[-1] - system.mesh[0])
-    for j in (np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1).tolist():
+    for j in changes(sides):
         (first, numbers), (last, _) = (batch.frozen(every, sides[i]) for i in (j - 1, j))
         k = int(np.flatnonzero(sides[j] != sides[j - 1])[0])
         t, u = system.mesh[j : j + 1], system._scaled_states(x)[[system.degree * j]]
@@ -122,12 +128,18 @@ def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
     return found
 
 
+def _ends(system: Any, found: Sequence[Crossing]) -> Array:
+    """Return the mesh points at the ends of the pieces between crossings."""
+    ends: Array = system.mesh[[0, *(each.node for each in found), -1]]
+    return ends
+
+
 def crossing_places(system: Any, x: Array) -> Switching:
     """Return where crossings are, as places of a mesh; those up to round-off cost nothing."""
     found, mesh, batch = system.crossings(x), system.mesh, system.problem.batch("field")
     origins = batch.conditions(range(len(batch.signature.parameters)))
     names = tuple(source(batch, origins[each.condition]) for each in found)
-    ends, delays = mesh[[0, *(each.node for each in found), -1]], np.array([each.delay for each in found])
+    ends, delays = _ends(system, found), np.array([each.delay for each in found])
     costs = [np.abs(each.shift / (1 + system.largest(x)[: each.gap.size])).max() for each in found]
     known = np.where(np.abs(delays) > CORRECTED * (mesh[-1] - mesh[0]), costs, 0.0)
     return Switching(ends[1:-1] + delays, known, np.full(len(found), True), names)
@@ -136,7 +148,7 @@ def crossing_places(system: Any, x: Array) -> Switching:
 def next_places(system: Any, x: Array) -> Array:
     """Return where crossings are; raise Grazing where a piece between them would lose most of its length."""
     found = crossing_places(system, x)
-    ends = system.mesh[[0, *(each.node for each in system.crossings(x)), -1]]
+    ends = _ends(system, system.crossings(x))
     lost = np.diff([ends[0], *found.places, ends[-1]]) < (1 - _SHRINKS) * np.diff(ends)
     if lost.any():
         at = int(np.argmax(lost))
@@ -157,8 +169,8 @@ def jumping() -> list[Event]:
     """Return the test functions that end a run: where a piece vanishes, a threshold is touched, or a solution would slide."""
 
     def shortest(trial: Trial) -> float:
-        system, found = trial.settled.system, _of(trial)
-        ends = system.mesh[[0, *(each.node for each in found), -1]] + [0.0, *(each.delay for each in found), 0.0]
+        found = _of(trial)
+        ends = _ends(trial.settled.system, found) + [0.0, *(each.delay for each in found), 0.0]
         return float(np.diff(ends).min() / (ends[-1] - ends[0]) - DOUBLED)
 
     def slides(trial: Trial) -> float:
@@ -215,7 +227,7 @@ def stepped(system: Any, x: Array, change: Array) -> tuple[Array, Array, Array]:
     moves = np.array(
         [each.delay + each.by_x @ np.append(change[:k].reshape(-1, n)[d * each.node], change[k:]) for each in found]
     )
-    ends, shorter = mesh[[0, *at, -1]], -np.diff(moves, prepend=0, append=0)
+    ends, shorter = _ends(system, found), -np.diff(moves, prepend=0, append=0)
     part = min(1.0, _SHRINKS / max((shorter / np.diff(ends)).max(), _SHRINKS))
     blocks = (x + part * change)[:k].reshape(-1, n)[system.by_interval]
     blocks[at, 0] += part * np.array([each.gap for each in found]) * moves[:, None]

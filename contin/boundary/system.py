@@ -19,6 +19,7 @@ from contin import draws
 from contin.arrays import Array, Indices, Places
 from contin.boundary.crossings import (
     Crossing,
+    changes,
     clearance,
     crossing_places,
     crossings,
@@ -139,8 +140,7 @@ class Collocation(Composed):
         a, b = problem.domain
         if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
-        if self._pieces is not None:
-            self.outcomes = self._pieces[1][np.searchsorted(self._pieces[0], (mesh[1:] + mesh[:-1]) / 2)]
+        self._take_pieces(mesh)
         self.mesh, self._h, self.intervals, self._grid = mesh, h, h.size, (mesh, degree)
         self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
         self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
@@ -311,9 +311,13 @@ class Collocation(Composed):
         for name in (*_ON_A_MESH, "_layout", "_columns", "_components", "outcomes"):
             vars(other).pop(name, None)
         other._pieces, other._round = pieces, 0
-        if pieces is not None:
-            other.outcomes = pieces[1][np.searchsorted(pieces[0], (self.mesh[1:] + self.mesh[:-1]) / 2)]
+        other._take_pieces(self.mesh)
         return other
+
+    def _take_pieces(self, mesh: Array) -> None:
+        """Set the outcomes on the intervals of a mesh, where they are frozen."""
+        if self._pieces is not None:
+            self.outcomes = self._pieces[1][np.searchsorted(self._pieces[0], (mesh[1:] + mesh[:-1]) / 2)]
 
     def crossed(self, x: Array) -> tuple[Self, Array]:
         """Return the same with mesh points and frozen outcomes where the equations jump along x, and x; else itself."""
@@ -325,10 +329,8 @@ class Collocation(Composed):
         system, carry = system.on_switches(x) or (system, np.array)
         t, x = (system.mesh[1:] + system.mesh[:-1]) / 2, carry(x)
         sides = outcomes(self.problem.batch("field"), t, system.evaluate(x, t), system.all_parameters(x))
-        changes = np.flatnonzero((sides[1:] != sides[:-1]).any(axis=1)) + 1
-        if not changes.size:
-            return system, x
-        return system.with_pieces((system.mesh[changes], sides[[0, *changes]])), x
+        at = changes(sides)
+        return (system.with_pieces((system.mesh[at], sides[[0, *at]])) if at else system), x
 
     def check_jumps(self, x: Array, state: State, settled: bool = True) -> None:
         """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations.

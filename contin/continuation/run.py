@@ -227,8 +227,8 @@ class Continuation:
             label, name = (
                 (Label.GRAZING if grazes else Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
             )
-            found = SpecialPoint(0.0, label, name, here, is_located=not grazes)  # it lies within a step that failed
-            yield self._point(found, self.state, accuracy=self._accuracy)
+            failure = SpecialPoint(0.0, label, name, here, is_located=not grazes)  # it lies within a step that failed
+            yield self._point(failure, self.state, accuracy=self._accuracy)
             return
         if isinstance(step, SpecialPoint):
             self.stop = step.stop

@@ -86,6 +86,17 @@ def _put(form, increment, to_form, to_increment, to_vector):
 
 
 @helper
+def _reflect(rows, v, half):
+    """Reflect rows along v, with v.v / 2."""
+    for row in range(rows.shape[0]):
+        product = 0.0
+        for i in range(v.size):
+            product += rows[row, i] * v[i]
+        for i in range(v.size):
+            rows[row, i] -= product / half * v[i]
+
+
+@helper
 def _condensed(form, increment, size, r, least):
     """Turn coordinates until the first r give all increments, and eliminate the others; return 0 where a pivot is too small.
 
@@ -102,24 +113,10 @@ def _condensed(form, increment, size, r, least):
         first = head + math.copysign(math.sqrt(total), head)
         half = (total - head * head + first * first) / 2
         increment[k, k] = first
-        for row in range(r, k, -1):
-            product = 0.0
-            for i in range(k, size):
-                product += increment[row, i] * increment[k, i]
-            for i in range(k, size):
-                increment[row, i] -= product / half * increment[k, i]
-        for row in range(size):
-            product = 0.0
-            for i in range(k, size):
-                product += form[row, i] * increment[k, i]
-            for i in range(k, size):
-                form[row, i] -= product / half * increment[k, i]
-        for column in range(size):
-            product = 0.0
-            for i in range(k, size):
-                product += form[i, column] * increment[k, i]
-            for i in range(k, size):
-                form[i, column] -= product / half * increment[k, i]
+        mirror = increment[k, k:size]
+        _reflect(increment[k + 1 : r + 1, k:size], mirror, half)
+        _reflect(form[:size, k:size], mirror, half)
+        _reflect(form[k:size, :size].T, mirror, half)
         increment[k, k] = -math.copysign(math.sqrt(total), head)
         for i in range(k + 1, size):
             increment[k, i] = 0.0
