@@ -311,7 +311,7 @@ def _unstable(trial: Trial) -> int:
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as not located where multipliers mean little."""
-    return dataclasses.replace(point, is_located=point.is_located and not _mean_little(point.trial))
+    return dataclasses.replace(point, is_located=point.is_located and not _mean_little(point.trial.settled))
 
 
 def _mean_little(trial: Trial) -> bool:
