@@ -216,19 +216,7 @@ class Continuation:
         try:
             step = self._step(self.state)
         except ConvergenceError as error:
-            here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
-            failed = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
-            grazes = isinstance(error, Grazing)
-            failed = Stop(Reason.EVENT, str(error), event="grazing") if grazes else failed
-            stop = self.state.system.explained(failed, here)
-            if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
-                return
-            self.stop = stop
-            label, name = (
-                (Label.GRAZING if grazes else Label.END, stop.event) if stop.event else (Label.FAILED, "no convergence")
-            )
-            failure = SpecialPoint(0.0, label, name, here, is_located=not grazes)  # it lies within a step that failed
-            yield self._point(failure, self.state, accuracy=self._accuracy)
+            yield from self._without_step(error)
             return
         if isinstance(step, SpecialPoint):
             self.stop = step.stop
@@ -271,6 +259,19 @@ class Continuation:
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
+
+    def _without_step(self, error: ConvergenceError) -> Iterator[Point]:
+        """Yield the point at which no step was possible and end there, unless shorter steps are left to try."""
+        here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
+        stop: Stop = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
+        grazes = isinstance(error, Grazing)
+        stop = self.state.system.explained(Stop(Reason.EVENT, str(error), event="grazing") if grazes else stop, here)
+        if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
+            return
+        self.stop = stop
+        label = Label.FAILED if not stop.event else Label.GRAZING if grazes else Label.END
+        failure = SpecialPoint(0.0, label, stop.event or "no convergence", here, is_located=not grazes)  # within a step
+        yield self._point(failure, self.state, accuracy=self._accuracy)
 
     def _turn(self, point: SpecialPoint, arc: Arc) -> Iterator[Point]:
         """Yield a corner, and go on behind it."""
