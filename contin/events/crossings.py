@@ -153,14 +153,7 @@ def _all(before: Factors, after: Factors, size: int) -> ComplexArray:
         return _finite_eigenvalues(after.solve(before.matrix.T))
     with np.errstate(all="ignore"):
         unit = np.eye(size)
-        earlier, later = before.solve(unit).T, after.solve(unit).T
-        if not (np.isfinite(later).all() and np.isfinite(earlier).all()):
-            return np.full(size, np.nan, dtype=complex)
-        try:
-            quotient: Any = np.linalg.solve(earlier, later)
-            return eigenvalues(quotient)
-        except np.linalg.LinAlgError:
-            return np.full(size, np.nan, dtype=complex)
+        return _finite_eigenvalues(DenseFactors(before.solve(unit).T).solve(after.solve(unit)))
 
 
 def _watched(before: Factors, after: Factors, size: int) -> ComplexArray | None:

@@ -15,9 +15,9 @@ from contin.levels import CORRECTED, DOUBLED
 from contin.linalg.small import factor_matrix, fill_eigenvalues, solve_rows
 
 #: Number of rows up to which kernels are used, which start no threads: one solution of a small system with those of BLAS takes
-#: 7 ms of the processor where other processes run. Eigenvalues are found faster than by LAPACK, ten times for three rows, twice
-#: for sixty; factors twice as fast up to fifty rows, half as fast for a hundred.
-_SMALL = 100
+#: 7 ms of the processor where other processes run, eigenvalues for a hundred rows 200 ms in place of 4. Factors are twice as fast
+#: as LAPACK's up to fifty rows, half as fast for a hundred; eigenvalues ten times for three rows, and as fast for two hundred.
+_SMALL, _SMALL_SPECTRUM = 128, 200
 
 
 @functools.cache
@@ -45,7 +45,7 @@ def eigenvalues(matrix: Array) -> ComplexArray:
     if not np.isfinite(matrix).all():
         return np.full(matrix.shape[:-1], np.nan, dtype=complex)
     n = matrix.shape[-1]
-    if n > _SMALL:
+    if n > _SMALL_SPECTRUM:
         return np.linalg.eigvals(matrix).astype(complex, copy=False)
     count = math.prod(matrix.shape[:-2])
     real, imaginary = np.empty((2, count, n))
