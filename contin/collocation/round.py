@@ -17,8 +17,8 @@ from contin.linalg.periodic import Product, condense, fill_logarithms, product_o
 from contin.linalg.small import fill_eigenvalues
 
 #: What comes of it: multipliers; one of an autonomous system that should be 1 and has drifted; none, which are NaN; none, as
-#: an interval is too long.
-KNOWN, DRIFTED, NOT_FINITE, COARSE = range(4)
+#: intervals want more parts than there is room for.
+KNOWN, DRIFTED, NOT_FINITE, FULL = range(4)
 #: Largest size z of a rate times the length of an interval by the error that a method of degree d makes in exp(z), for which it
 #: takes (1 + z / 2 + ...) / (1 - z / 2 + ...), which tends to 1 or -1 on both sides: 2 at degree 4, 4.2 at degree 6. At a
 #: thousand times the error intervals may be one and a half to two times as long, and no digit of the logarithm is right.
@@ -35,19 +35,25 @@ class Monodromy(NamedTuple):
     """The room for it.
 
     ``jacobian`` (N d, n, n) is given; ``order`` (n,) are the states by which its columns stand in a linearized system. An
-    interval may have the ``length``, times the size of a rate. ``matrices`` (N, n, n) are transitions and, where there is a
-    symmetry, its inverse. ``real`` and ``imaginary`` (n,) are the logarithms found.
+    interval may have the ``length``, times the size of a rate; longer ones are divided, and those of each begin in ``starts``
+    (N + 1,) among the ``matrices``, which are transitions and, where there is a symmetry, its inverse ``turn`` (0 or 1, n, n).
+    ``real`` and ``imaginary`` (n,) are the logarithms found.
     """
 
+    points: Vector
     value: Matrix
     slope: Matrix
     h: Vector
+    starts: IndexVector
+    turn: Stack
     quadrature: Vector
     order: IndexVector
     length: float
     autonomous: int
     planar: int
     jacobian: Stack
+    part: Stack
+    length_of_part: Vector
     block: Matrix
     pivots: IndexVector
     matrices: Stack
@@ -56,20 +62,31 @@ class Monodromy(NamedTuple):
     imaginary: Vector
 
 
-def monodromy_of(system: Any, error: float = _LONG) -> Monodromy:
-    """Return the room of a system of cycles."""
+def monodromy_of(system: Any, parts: int = 0) -> Monodromy:
+    """Return the room of a system of cycles, for no fewer than so many parts of intervals."""
     n, d, intervals = system.states_count, system.degree, system.intervals
-    length = (error * math.factorial(2 * d) * math.factorial(2 * d + 1) / math.factorial(d) ** 2) ** (1 / (2 * d + 1))
-    symmetric = system.order > 1
-    matrices = np.empty((intervals + symmetric, n, n))
-    if symmetric:
-        matrices[-1] = np.linalg.inv(system.turn)
+    length = (_LONG * math.factorial(2 * d) * math.factorial(2 * d + 1) / math.factorial(d) ** 2) ** (1 / (2 * d + 1))
+    turn = np.linalg.inv(system.turn)[None] if system.order > 1 else np.empty((0, n, n))
+    matrices, planar = np.empty((max(intervals, parts) + len(turn), n, n)), system.autonomous and n == 2 and not len(turn)
     return Monodromy(
-        system.basis.value, system.basis.slope, np.diff(system.mesh), system.gauss_weights, system.order_of_states,
-        length, int(system.autonomous), int(system.autonomous and n == 2 and not symmetric), np.empty((intervals * d, n, n)),
+        system.basis.points, system.basis.value, system.basis.slope, np.diff(system.mesh),
+        np.empty(intervals + 1, np.int64), turn, system.gauss_weights, system.order_of_states, length,
+        int(system.autonomous), int(planar), np.empty((intervals * d, n, n)), np.empty((d, n, n)), np.empty(1),
         np.empty((d * n, (d + 1) * n)), np.empty((d + 1) * n, np.int64), matrices, product_of(len(matrices), n),
         np.empty(n), np.empty(n),
     )  # fmt: skip
+
+
+def larger(system: Any, room: Monodromy) -> Monodromy:
+    """Return a room for the parts of intervals that another one had no room for, and some more."""
+    return monodromy_of(system, 3 * int(room.starts[-1]) // 2)
+
+
+def ends_of_parts(mesh: Array, room: Monodromy) -> Array:
+    """Return where the parts of intervals begin, and where the last ends."""
+    counts = np.diff(room.starts)
+    inside = np.concatenate([np.arange(count) / count for count in counts])
+    return np.append(np.repeat(mesh[:-1], counts) + inside * np.repeat(room.h, counts), mesh[-1])
 
 
 @kernel(reorder=False, last=True)
@@ -77,11 +94,11 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
     """Fill in the logarithms, or put right by Liouville's formula those that are ``known``; return what comes of it."""
     real, imaginary, n = room.real, room.imaginary, room.real.size
     if not known:
-        for j in range(0 if room.planar else room.h.size):
-            if is_coarse(room, j):
-                return COARSE
-        condense(room.value, room.slope, room.h, room.jacobian, room.block, room.pivots, room.matrices[: room.h.size])
-        fill_logarithms(room.matrices, room.product, real, imaginary)
+        count = room.turn.shape[0] + _divide(room)
+        if count > room.matrices.shape[0]:
+            return FULL
+        _condense(room)
+        fill_logarithms(room.matrices[:count], room.product, real, imaginary)
         if real[0] != real[0] and not room.planar:  # noqa: PLR0124
             return NOT_FINITE
         if room.autonomous and not room.planar and not nearest_to_one(room)[1] <= APART:
@@ -121,8 +138,21 @@ def nearest_to_one(room: Monodromy) -> tuple[int, float]:
 
 
 @helper
-def is_coarse(room: Monodromy, j: int) -> bool:
-    """Return whether perturbations grow and decay too much over an interval, by the eigenvalues in its middle."""
+def _divide(room: Monodromy) -> int:
+    """Fill in where the parts of each interval begin; return how many there are."""
+    room.starts[0] = 0
+    for j in range(room.h.size):
+        room.starts[j + 1] = room.starts[j] + (1 if room.planar else _parts(room, j))
+    count: int = room.starts[room.h.size]
+    return count
+
+
+@helper
+def _parts(room: Monodromy, j: int) -> int:
+    """Return into how many parts an interval is divided: those over which perturbations do not grow and decay too much.
+
+    By the eigenvalues in its middle.
+    """
     n, d, size, growth = room.real.size, room.jacobian.shape[0] // room.h.size, 0.0, 0.0
     middle = room.jacobian[j * d + d // 2]
     for a in range(n):  # bounds of both
@@ -131,7 +161,7 @@ def is_coarse(room: Monodromy, j: int) -> bool:
             others += abs(middle[a, b]) if b != a else 0.0
         size, growth = max(size, others + abs(middle[a, a])), max(growth, others + middle[a, a])
     if not (room.h[j] * size > room.length and room.h[j] * growth > _GROWS):
-        return False
+        return 1
     for a in range(n):
         for b in range(n):
             room.product.square[0, a, b] = middle[a, b]
@@ -140,17 +170,36 @@ def is_coarse(room: Monodromy, j: int) -> bool:
     size, growth = 0.0, 0.0
     for a in range(n):
         size, growth = max(size, math.hypot(real[0, a], imaginary[0, a])), max(growth, real[0, a])
-    found: bool = room.h[j] * size > room.length and room.h[j] * growth > _GROWS
-    return found
+    return 1 + int(min(room.h[j] * size / room.length, _PARTS - 1.0)) if room.h[j] * growth > _GROWS else 1
 
 
-def resolving(system: Any, room: Monodromy) -> Array:
-    """Return the mesh with intervals divided over which perturbations grow and decay too much."""
-    rates = np.linalg.eigvals(room.jacobian[system.degree // 2 :: system.degree])
-    sizes = np.where(room.h * rates.real.max(axis=1) > _GROWS, room.h * np.abs(rates).max(axis=1), 0.0)
-    parts = np.ceil(sizes / room.length).clip(1, _PARTS).astype(int)
-    pieces = [left + h * np.arange(count) / count for left, h, count in zip(system.mesh, room.h, parts)]
-    return np.append(np.concatenate(pieces), system.mesh[-1])
+@helper
+def _condense(room: Monodromy) -> None:
+    """Fill the transition matrices of all parts, with the polynomial through the derivatives at the Gauss points."""
+    d, n, intervals = room.points.size, room.real.size, room.h.size
+    if room.starts[intervals] == intervals:
+        condense(room.value, room.slope, room.h, room.jacobian, room.block, room.pivots, room.matrices[:intervals])
+    for j in range(0 if room.starts[intervals] == intervals else intervals):
+        first, parts = room.starts[j], room.starts[j + 1] - room.starts[j]
+        room.length_of_part[0] = room.h[j] / parts
+        for i in range(parts):
+            for q in range(d):
+                for a in range(n):
+                    for b in range(n):
+                        room.part[q, a, b] = 0.0
+                for m in range(d):
+                    share = 1.0 if parts > 1 or m == q else 0.0
+                    for k in range(d if parts > 1 else 0):
+                        place = (i + room.points[q]) / parts - room.points[k]
+                        share *= place / (room.points[m] - room.points[k]) if k != m else 1.0
+                    for a in range(n if share != 0.0 else 0):
+                        for b in range(n):
+                            room.part[q, a, b] += share * room.jacobian[j * d + m, a, b]
+            matrices = room.matrices[first + i : first + i + 1]
+            condense(room.value, room.slope, room.length_of_part, room.part, room.block, room.pivots, matrices)
+    for a in range(n if room.turn.shape[0] else 0):
+        for b in range(n):
+            room.matrices[room.starts[intervals], a, b] = room.turn[0, a, b]
 
 
 #: Values that are compared in each interval, per degree.

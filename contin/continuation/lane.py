@@ -18,6 +18,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.collocation import newton as one_call
 from contin.collocation.defect import estimate, estimate_of
+from contin.collocation.round import larger
 from contin.continuation import plain_on_mesh as on_mesh
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, Rooms, plain_steps
@@ -281,9 +282,11 @@ class MeshLane(Lane):
             factors = self._factors[0]
         self._compared(factors.room, 1)
         room, jacobian = self._monodromy, values.jacobian
-        if room is not None and on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK:
-            return None
-        return factors, 0
+        asks = room is not None and on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK
+        if asks and room.starts[-1] + len(room.turn) > len(room.matrices):
+            self._monodromy = room = larger(self.system, room)
+            asks = on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK
+        return None if asks else (factors, 0)
 
     def _compared(self, factored: Factored, begins: int) -> int:
         """Return what condensed matrices say of a step that ends at a matrix."""

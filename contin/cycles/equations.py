@@ -14,7 +14,7 @@ from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.boundary.crossings import jumping
 from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
-from contin.collocation.round import COARSE, DRIFTED, Monodromy, extremes, fill_multipliers, monodromy_of, resolving
+from contin.collocation.round import DRIFTED, FULL, Monodromy, ends_of_parts, extremes, fill_multipliers, larger, monodromy_of
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.spectral import on_circle
@@ -305,24 +305,24 @@ class PeriodicCollocation(OfCycles, Collocation):
             self._monodromies[thread] = monodromy_of(self)
         room = self._monodromies[thread]
         room.jacobian[:] = self._jacobian_of_field(x)
-        return room, fill_multipliers(room, 0)
+        outcome = fill_multipliers(room, 0)
+        if outcome != FULL:
+            return room, outcome
+        self._monodromies[thread] = larger(self, room)
+        return self._filled(x)
 
     def _computed(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
-        return self._resolved(x, *self._filled(x))
+        return self._across_jumps(x, self._filled(x)[0])
 
-    def _resolved(self, x: Array, room: Monodromy, outcome: int) -> ComplexArray:
-        """Return the logarithms of the multipliers; on a finer mesh where intervals are too long for them."""
-        if outcome != COARSE and self.outcomes.size:
-            matrices = room.matrices.copy()
-            for each in self.crossings(x):
-                matrices[each.node] = matrices[each.node] @ each.by_states
-            return log_eigenvalues(matrices)
-        if outcome != COARSE:
+    def _across_jumps(self, x: Array, room: Monodromy) -> ComplexArray:
+        """Return the logarithms of the multipliers of what a kernel has filled in, where the field may jump."""
+        if not self.outcomes.size:
             return room.real + 1j * room.imaginary
-        finer, carry = self.on_mesh(resolving(self, room))
-        finer._monodromies[threading.get_ident()] = monodromy_of(finer, math.inf)
-        return finer._computed(carry(x))
+        matrices = room.matrices[: room.starts[-1] + len(room.turn)].copy()
+        for each in self.crossings(x):
+            matrices[room.starts[each.node]] = matrices[room.starts[each.node]] @ each.by_states
+        return log_eigenvalues(matrices)
 
     def whole_round(self, values: ComplexArray) -> ComplexArray:
         """Return the logarithms of the multipliers over the whole period, n times those over one n-th of it."""
@@ -494,11 +494,12 @@ class CycleCollocation(PeriodicCollocation):
         room, outcome = self._filled(x)
         if outcome == DRIFTED and not self.outcomes.size:
             self._drifted.add(x.tobytes())
-            flow, count = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d])), len(room.matrices)
-            values = log_eigenvalues_along(room.matrices, np.concatenate([flow[:count], flow[:1]]))
+            count = room.starts[-1] + len(room.turn)
+            flow = self.rates(x, self._interpolated(x, ends_of_parts(self.mesh, room)))
+            values = log_eigenvalues_along(room.matrices[:count], np.concatenate([flow[:count], flow[:1]]))
             room.real[:], room.imaginary[:] = values.real, values.imag
             fill_multipliers(room, 1)
-        return self._resolved(x, room, outcome)
+        return self._across_jumps(x, room)
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""

@@ -15,8 +15,8 @@ from contin.levels import CORRECTED, DOUBLED
 from contin.linalg.small import factor_matrix, fill_eigenvalues, solve_rows
 
 #: Number of rows up to which kernels are used, which start no threads: one solution of a small system with those of BLAS takes
-#: 7 ms of the processor where other processes run, eigenvalues for a hundred rows 200 ms in place of 4. Factors are twice as fast
-#: as LAPACK's up to fifty rows, half as fast for a hundred; eigenvalues ten times for three rows, and as fast for two hundred.
+#: 7 ms of the processor where other processes run, a spectrum of a hundred rows 200 ms in place of 4. Factors are twice as
+#: fast as LAPACK's up to fifty rows, half as fast for a hundred; spectra ten times for three rows, as fast for two hundred.
 _SMALL, _SMALL_SPECTRUM = 128, 200
 
 

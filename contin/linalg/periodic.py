@@ -100,7 +100,7 @@ def log_eigenvalues(factors: Array) -> ComplexArray:
 
 
 def product_of(count: int, n: int) -> Product:
-    """Return the room for so many factors (n, n)."""
+    """Return the room for so many factors (n, n), or fewer."""
     first, last, coupling, product, vectors = np.empty((5, n, n))
     iterates = Iterates(first, last, np.empty((count, n, n)), coupling, product, vectors, np.empty(n))
     groups = Groups(np.empty(n + 1, np.int64), np.empty((n, n)), np.empty(n))
@@ -151,8 +151,8 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
 @kernel(reorder=False, last=True)
 def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
     """Iterate from the first basis until groups of eigenvalues are apart; fill the groups, and return their number."""
-    first, last, triangles, coupling, product, vectors, sizes = iterates
-    n, count = sizes.size, 1
+    first, last, room, coupling, product, vectors, sizes = iterates
+    n, count, triangles = sizes.size, 1, room[: factors.shape[0]]
     for _ in range(MOST_STEPS):
         for a in range(n):
             for b in range(n):
