@@ -140,7 +140,7 @@ class Control(NamedTuple):
 
 
 @helper
-def _evaluate(codes, mesh, room, x, slopes):
+def evaluate(codes, mesh, room, x, slopes):
     """Fill values at x and, with ``slopes``, derivatives; return whether Python need not do it."""
     n = room.points.shape[1]
     put_free(mesh, room, x)
@@ -198,7 +198,7 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
     """Chord steps with the factors at hand, for an x that is close."""
     before = 1.0
     for number in range(CHORDS):
-        if not _evaluate(codes, mesh, room, x, False):
+        if not evaluate(codes, mesh, room, x, False):
             return STAGNATES
         _fill_residual(mesh, room, x)
         _solve(mesh, room, matrix)
@@ -222,7 +222,7 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     before, size, moved, fresh = math.inf, math.inf, 1.0, True
     for number in range(control.most):
-        if not _evaluate(codes, mesh, room, x, fresh):
+        if not evaluate(codes, mesh, room, x, fresh):
             return STAGNATES
         _fill_residual(mesh, room, x)
         if fresh:
@@ -245,7 +245,7 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
 def _linearize(work, matrix, x, weights, tangent, report, known):
     """Factor the matrix right at x, unless the factors at hand are ``known`` to be those, and fill the unit tangent."""
     codes, mesh, room = work
-    if not _evaluate(codes, mesh, room, x, not known):
+    if not evaluate(codes, mesh, room, x, not known):
         return STAGNATES
     _fill_residual(mesh, room, x)
     for i in range(room.right.shape[1] - 1):

@@ -205,7 +205,7 @@ class MeshLane(Lane):
         k, segments = len(system.free), self._work.mesh.whole.last
         self._relations = [Relations.unfilled(system.intervals, n, k, segments) for _ in range(2)]
         self._quotient, self._watched = _quotient((segments + 1) * n + k), settings.branch_points
-        self.spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
+        self.spectra, self._estimate = spectra_of(n - autonomous, system.size), estimate_of(system.defect)
         self._left: tuple[Array, _Begun] | None = None
 
     def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:
@@ -239,7 +239,7 @@ class MeshLane(Lane):
                 found, clear = on_mesh.MAY_BRANCH, self._compared(after.room, 0)
                 if self._monodromy is not None:
                     earlier, time = time, self.system.unit_time(path.x[number])
-                    found = on_mesh.multipliers_ask(self._monodromy, self.spectra, values.jacobian, time / earlier)
+                    found = self._multipliers_ask(path, number, step, time / earlier)
                 asks = found == on_mesh.ASK or not (found == on_mesh.AWAY or self._stays_regular(clear, before, after))
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
@@ -281,12 +281,17 @@ class MeshLane(Lane):
                 return None
             factors = self._factors[0]
         self._compared(factors.room, 1)
-        room, jacobian = self._monodromy, values.jacobian
-        asks = room is not None and on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK
+        room = self._monodromy
+        asks = room is not None and self._multipliers_ask(path, 1, 0.0, 0.0) == on_mesh.ASK
         if asks and room.starts[-1] + len(room.turn) > len(room.matrices):
-            self._monodromy = room = larger(self.system, room)
-            asks = on_mesh.multipliers_ask(room, self.spectra, jacobian, 0.0) == on_mesh.ASK
+            self._monodromy = larger(self.system, room)
+            asks = self._multipliers_ask(path, 1, 0.0, 0.0) == on_mesh.ASK
         return None if asks else (factors, 0)
+
+    def _multipliers_ask(self, path: rules.Path, number: int, step: float, longer: float) -> int:
+        """Return what multipliers say of the step that ends at a row of a path."""
+        given = self._monodromy, self.spectra, self._attempt, path, number, step, longer
+        return int(on_mesh.multipliers_ask(self._work, *given))
 
     def _compared(self, factored: Factored, begins: int) -> int:
         """Return what condensed matrices say of a step that ends at a matrix."""

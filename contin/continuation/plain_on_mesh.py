@@ -19,9 +19,21 @@ from contin.continuation.rules import Attempt, Control, Frame, Path, Watched
 from contin.core.newton import STAGNANT
 from contin.core.small import ASKS, BELIEVED, FAILED
 from contin.core.step import COLLAPSED
+from contin.events.arc import LEAST_COSINE
 from contin.events.crossings import TURN
 from contin.events.dips import AS_FAR
-from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
+from contin.events.spectra import (
+    FIRST,
+    LAST,
+    Spectra,
+    crosses,
+    fill_cubic,
+    fill_place,
+    insert,
+    keep_off_one,
+    may_cross_between,
+    passes_inside,
+)
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import Matrix, Stack, Vector, helper
 from contin.levels import APART
@@ -134,19 +146,10 @@ def ends_are_calm(mesh: Mesh, factored: Factored, before: Relations, after: Rela
     return CALM if calm(quotient) else CHANGES
 
 
-@kernel(reorder=False, last=True)
-def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: float) -> int:
-    """Return `ASK` where multipliers at a point that was linearized ask for a closer look at the step that ends there.
-
-    `AWAY` where they do not, and none comes near 1. The end of the step before is its beginning, with a round that takes
-    ``longer`` at its end by this factor; where that is 0, the step begins here and nothing is compared. Round-off on the circle
-    asks, too.
-    """
-    n, size, before = room.real.size, spectra.real.shape[1], spectra.moved[0]
-    if longer > 0.0:
-        spectra.moved[0] = math.inf
-    for a in range(size):
-        spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
+@helper
+def _keeps(room: Monodromy, spectra: Spectra, jacobian: Stack, row: int) -> bool:
+    """Keep the multipliers where it was linearized, but for the one that is 1, in a row; return whether all are clear."""
+    n, at = room.real.size, 0
     for q in range(jacobian.shape[0]):
         for c in range(n):
             b = room.order[c]
@@ -154,20 +157,54 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, longer: 
                 room.jacobian[q, a, b] = jacobian[q, a, c]
     known = fill_multipliers(room, 0)
     if known not in (KNOWN, DRIFTED):
-        return ASK
+        return False
     trivial, least = nearest_to_one(room) if room.autonomous else (-1, 0.0)
     clear = APART if known == KNOWN else _CLEAR * least
-    at = 0
     for a in range(n):
         x, y = room.real[a], room.imaginary[a]
         if a == trivial:
             continue
         if not abs(x) >= clear or not math.hypot(x, y) > AS_FAR * least:
-            return ASK
-        spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
+            return False
+        insert(spectra.real[row], spectra.imaginary[row], at, x, y)
         at += 1
-    if longer == 0.0:
-        return AWAY
-    if may_cross_between(spectra, longer, before):
-        return ASK
+    return True
+
+
+@kernel(reorder=False, last=True)
+def multipliers_ask(
+    work: Workspace, room: Monodromy, spectra: Spectra, attempt: Attempt, path: Path, number: int, step: float, longer: float
+) -> int:
+    """Return `ASK` where multipliers at a point that was linearized ask for a closer look at the step that ends there.
+
+    `AWAY` where they do not, and none comes near 1. The end of the step before is its beginning, with a round that takes
+    ``longer`` at its end by this factor; where that is 0, the step begins here and nothing is compared. Round-off on the circle
+    asks, too. Where they may pass something between both ends, places inside are looked at, on the cubic.
+    """
+    codes, mesh, values = work
+    before, x, new, clear = spectra.moved[0], path.x[number - 1], path.x[number], True
+    if longer > 0.0:
+        spectra.moved[0] = math.inf
+    for a in range(spectra.real.shape[1]):
+        spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
+    for turn in range(LAST + 1):  # the end, places inside, and the end again, so that values are those there
+        if turn > 0:
+            fill_place(spectra, turn)
+            one_call.evaluate(codes, mesh, values, new if turn == LAST else spectra.place, True)
+        if turn < LAST and clear:
+            clear = _keeps(room, spectra, values.jacobian, turn or LAST)
+        if turn == 0:
+            if not clear or (longer > 0.0 and crosses(spectra)):
+                return ASK
+            if longer == 0.0:
+                return AWAY
+            if not may_cross_between(spectra, longer, before):
+                break
+            rate = step / max(attempt.judged[rules.COSINE], LEAST_COSINE)
+            fill_cubic(spectra, x, path.tangents[number - 1], new, path.tangents[number], step, rate)
+        elif turn == LAST:
+            for i in range(x.size):
+                values.at[i] = new[i]
+            if not clear or passes_inside(spectra, True, True):
+                return ASK
     return AWAY if keep_off_one(spectra, longer) else MAY_BRANCH

@@ -87,6 +87,16 @@ def spectra_of(n: int, size: int) -> Spectra:
 
 
 @helper
+def insert(real: Vector, imaginary: Vector, count: int, x: float, y: float) -> None:
+    """Insert an eigenvalue among so many that are sorted."""
+    at = count
+    while at > 0 and (real[at - 1] > x or (real[at - 1] == x and imaginary[at - 1] > y)):
+        real[at], imaginary[at] = real[at - 1], imaginary[at - 1]
+        at -= 1
+    real[at], imaginary[at] = x, y
+
+
+@helper
 def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
     """Fill in a row from the derivatives that were evaluated; return whether round-off decides on the side of one of them."""
     n, doubt = spectra.real.shape[1], False
@@ -109,11 +119,7 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
         x, y = one[i], other[i]
         if not equations.is_map:
             doubt = doubt or not (abs(x) >= LOCATED * largest or y == 0.0 or x == 0.0)
-        at = i
-        while at > 0 and (real[at - 1] > x or (real[at - 1] == x and imaginary[at - 1] > y)):
-            real[at], imaginary[at] = real[at - 1], imaginary[at - 1]
-            at -= 1
-        real[at], imaginary[at] = x, y
+        insert(real, imaginary, i, x, y)
     return doubt
 
 
@@ -191,14 +197,27 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 
 @helper
 def may_cross_between(spectra: Spectra, longer: float, before: float) -> bool:
-    """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step and moves ``before`` it."""
-    spectra.moved[0] = _moved(spectra)
-    if _crosses(spectra):
-        return True
+    """Return whether multipliers may pass -1, or the circle as a pair, and back, by both ends of a step and moves before."""
     if _STILL * max(spectra.moved[0], before) < 1:
         return False
     real, imaginary = spectra.real, spectra.imaginary
     return bool(comes_near(real, imaginary, MINUS_ONE, 0, longer) or comes_near(real, imaginary, CIRCLE, 0, longer))
+
+
+@helper
+def crosses(spectra: Spectra) -> bool:
+    """Return whether multipliers have passed -1 or the circle from one end of a step to the other; note how far they moved."""
+    spectra.moved[0] = _moved(spectra)
+    return _crosses(spectra)
+
+
+@helper
+def passes_inside(spectra: Spectra, doubles: bool, twists: bool) -> bool:
+    """Return whether multipliers may pass -1 or, as a pair, the circle by all places of a step."""
+    for number in range(1, LAST):
+        _fill_values(spectra, number)
+    real, imaginary = spectra.real, spectra.imaginary
+    return (doubles and _dips(spectra)) or (twists and find_moves(real, imaginary, spectra.parts, spectra.quarters) > 0)
 
 
 @helper
@@ -234,8 +253,7 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     for number in range(1, LAST):
         if _look(equations, spectra, number):
             return True
-        _fill_values(spectra, number)
-    return (doubles and _dips(spectra)) or (twists and find_moves(real, imaginary, spectra.parts, spectra.quarters) > 0)
+    return passes_inside(spectra, doubles, twists)
 
 
 @helper
@@ -249,12 +267,18 @@ def _crosses(spectra: Spectra) -> bool:
 @helper
 def _look(equations: Equations, spectra: Spectra, number: int) -> bool:
     """Fill in the eigenvalues at a place of the cubic; return whether round-off decides on the side of one of them."""
+    fill_place(spectra, number)
+    evaluate_slopes(equations, spectra.place)
+    return fill_spectrum(equations, spectra, number)
+
+
+@helper
+def fill_place(spectra: Spectra, number: int) -> None:
+    """Fill in a place of the cubic."""
     s = spectra.parts[number]
     for i in range(spectra.place.size):
         one, two, three, four = spectra.cubic[0, i], spectra.cubic[1, i], spectra.cubic[2, i], spectra.cubic[3, i]
         spectra.place[i] = one + s * (two + s * (three + s * four))
-    evaluate_slopes(equations, spectra.place)
-    return fill_spectrum(equations, spectra, number)
 
 
 @helper
