@@ -30,7 +30,7 @@ def alone(name: str, repeats: int, as_auto: bool) -> None:
 
     if as_auto:
         ours.take_autos_tolerances()
-    print(json.dumps(ours.run(name, repeats)))
+    print(json.dumps(ours.run(name, repeats, checked=not as_auto)))
 
 
 def contin_of(name: str, repeats: int, as_auto: bool = False) -> dict:

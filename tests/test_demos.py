@@ -37,7 +37,7 @@ def test_small_demos_give_autos_values(name):
     recorded = json.loads(command.RECORDED.read_text())[name]
     (demo,) = [demo for demo in DEMOS if demo.name == name]
     for part in demo.parts:
-        rows = compare.rows(recorded["runs"], recorded["fine"], compare.of_contin(part.branches(), part), part)
+        rows = compare.rows(recorded["runs"], recorded["fine"], compare.of_contin(part.branches(), part, checked=True), part)
         assert rows
         for row in rows:
             assert row.auto and row.contin and row.fine, row

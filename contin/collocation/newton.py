@@ -140,7 +140,7 @@ class Control(NamedTuple):
 
 
 @helper
-def evaluate(codes, mesh, room, x, slopes):
+def evaluate(codes: Codes, mesh: Mesh, room: Values, x: Array, slopes: bool) -> bool:
     """Fill values at x and, with ``slopes``, derivatives; return whether Python need not do it."""
     n = room.points.shape[1]
     put_free(mesh, room, x)

@@ -67,8 +67,11 @@ def value(point: Point, column: Column) -> float:
     return float(point.details["frequency"] if column == "frequency" else point[column])
 
 
-def of_contin(branches: Sequence[Branch], part: Part) -> list[dict]:
-    """Return contin's labelled points, the first of each branch left out; an end counts as a point with a given value."""
+def of_contin(branches: Sequence[Branch], part: Part, checked: bool) -> list[dict]:
+    """Return contin's labelled points, the first of each branch left out; an end counts as a point with a given value.
+
+    Where they are ``checked``, SciPy computes the multipliers of cycles, too: of poor ones its integration does not end.
+    """
     found = []
     for branch in branches:
         for point in branch.points[1:]:
@@ -79,7 +82,8 @@ def of_contin(branches: Sequence[Branch], part: Part) -> list[dict]:
             first = next(iter(part.columns.values()))
             error = point.errors.get(first) if isinstance(first, str) else None
             values = [value(point, column) for column in part.columns.values()]
-            found.append({"label": label, "values": values, "error": error, "end": last, "check": distance(point)})
+            check = distance(point) if checked else None
+            found.append({"label": label, "values": values, "error": error, "end": last, "check": check})
     return found
 
 

@@ -52,7 +52,7 @@ def branches(demo: Demo) -> list:
     return [part.branches() for part in demo.parts]
 
 
-def run(name: str, repeats: int) -> dict:
+def run(name: str, repeats: int, checked: bool) -> dict:
     """Return the points of a demo, and processor seconds of what contin computes; the comparison is not in them.
 
     ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of at most
@@ -69,5 +69,5 @@ def run(name: str, repeats: int) -> dict:
         began = time.process_time()
         branches(demo)
         further.append(time.process_time() - began)
-    points = [of_contin(each, part) for each, part in zip(found, demo.parts)]
+    points = [of_contin(each, part, checked) for each, part in zip(found, demo.parts)]
     return {"points": points, "first": first, "again": statistics.median(further)}
