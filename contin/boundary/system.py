@@ -67,6 +67,15 @@ def _NONE(n: int) -> Array:
     return np.empty((0, n))
 
 
+def _by_node(blocks: Array) -> Array:
+    """Return what nodes have of all intervals, (N d + 1, n), from what each interval gives to its own, (N, d + 1, n)."""
+    count, nodes, n = blocks.shape
+    found = np.zeros((count * (nodes - 1) + 1, n))
+    found[:-1] = blocks[:, :-1].reshape(-1, n)
+    found[nodes - 1 :: nodes - 1] += blocks[:, -1]
+    return found
+
+
 class Collocation(Composed):
     """A problem discretized on a mesh: what the continuation loop works on.
 
@@ -150,8 +159,7 @@ class Collocation(Composed):
         self.size = self.state_size + len(self.free)
         self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
         self.equations = self._conditions
-        node_weights = np.zeros(self.intervals * degree + 1)
-        np.add.at(node_weights, self._by_interval, (h[:, None] * self.basis.node_weights) / (b - a))
+        node_weights = _by_node((h[:, None] * self.basis.node_weights / (b - a))[:, :, None])[:, 0]
         #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
         self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
 
@@ -558,7 +566,7 @@ class Collocation(Composed):
         """Return F_x^T w, shape (size,), for w (equations,)."""
         inside, ends = self._terms
         result = inside.transposed(x, w) + ends.transposed(x, w)
-        rates = np.einsum("qm,jqa->jma", self.basis.slope, w[: self._inner].reshape(self.intervals, self._d, self._n))
+        rates = self.basis.slope.T @ w[: self._inner].reshape(self.intervals, self._d, self._n)
         result = result + self._gathered(rates, np.zeros(len(self.free)))
         return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
 
@@ -581,16 +589,14 @@ class Collocation(Composed):
     def _to_nodes(self, slopes: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
         by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        return self._gathered(np.einsum("qm,jqa->jma", self.basis.value, by_points), slopes[:, self._n :].sum(axis=0))
+        return self._gathered(self.basis.value.T @ by_points, slopes[:, self._n :].sum(axis=0))
 
     def _gathered(self, blocks: Array, free: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by the states of each interval, (N, d + 1, n), and others."""
         for each in self._last_crossings:
             free = free + blocks[each.node, 0] @ each.by_free
             blocks[each.node, 0] = blocks[each.node, 0] @ each.by_states
-        by_node = np.zeros((self.nodes.size, self._n))
-        np.add.at(by_node, self._by_interval, blocks)
-        return np.append(by_node.ravel(), free)
+        return np.append(_by_node(blocks).ravel(), free)
 
     # --- functionals ---------------------------------------------------------------------------------------------
 

@@ -170,7 +170,7 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     if h.size < 2:
         return np.ones(1)
     local = states[d * np.arange(h.size)[:, None] + np.arange(d + 1)]
-    derivative = np.einsum("l,jla->ja", basis.highest, local) / h[:, None] ** d
+    derivative = basis.highest @ local / h[:, None] ** d
     jumps = np.abs(derivative[1:] - derivative[:-1]) / ((h[1:] + h[:-1]) / 2)[:, None]
     jumps = (jumps / np.maximum(1.0, np.abs(states).max(axis=0))).max(axis=1)
     if len(breaks):

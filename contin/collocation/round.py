@@ -85,8 +85,8 @@ def larger(system: Any, room: Monodromy) -> Monodromy:
 def ends_of_parts(mesh: Array, room: Monodromy) -> Array:
     """Return where the parts of intervals begin, and where the last ends."""
     counts = np.diff(room.starts)
-    inside = np.concatenate([np.arange(count) / count for count in counts])
-    return np.append(np.repeat(mesh[:-1], counts) + inside * np.repeat(room.h, counts), mesh[-1])
+    begins, h, first = (np.repeat(each, counts) for each in (mesh[:-1], room.h / counts, room.starts[:-1]))
+    return np.append(begins + h * (np.arange(len(first)) - first), mesh[-1])
 
 
 @kernel(reorder=False, last=True)
