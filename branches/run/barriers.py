@@ -155,13 +155,9 @@ def _ways(states: Sequence[State]) -> dict[str, Barrier]:
 
 def _name(end: NetworkChain, stable: Sequence[State]) -> str | None:
     """Return the name of the stable state in which a strip rests, or of one that it is an image of; None for another one."""
-    rests = []
-    for state in stable:
-        way = descend(state.chain(end.asked), longest=LONGEST / state.stage.scene.longest)
-        rests.append((state.name, way.end))
-    for name, rest in rests:
-        if not apart(end, rest):
-            return name
+    rests = [(one.name, descend(one.chain(end.asked), longest=LONGEST / one.stage.scene.longest).end) for one in stable]
+    if same := next((name for name, rest in rests if not apart(end, rest)), None):
+        return same
     equal = (name for name, rest in rests if abs(end.energy - rest.energy) < levels.APART * (1 + abs(rest.energy)))
     return next((f"an image of {name}" for name in equal), None)
 

@@ -128,7 +128,7 @@ class _Worker:
             good, result = pickle.loads(self.pipe.recv_bytes())
         except (EOFError, OSError):
             self.process.join()
-            good, result = False, WorkerDied(self.process.exitcode)
+            good, result = False, WorkerDied(f"its process died (exit code {self.process.exitcode})")
         (future.set_result if good else future.set_exception)(result)
         return future
 
@@ -141,9 +141,6 @@ class _Worker:
 
 class WorkerDied(Exception):
     """A process that ended before its job."""
-
-    def __init__(self, exitcode: int | None):
-        super().__init__(f"its process died (exit code {exitcode})")
 
 
 class _Processes:
@@ -183,15 +180,12 @@ class _Processes:
                 worker.finish()
                 if not worker.process.is_alive():
                     self._workers.remove(worker)
-            self._end_late_ones()
+            for worker in [worker for worker in self._workers if time.monotonic() > worker.deadline]:
+                self._workers.remove(worker)
+                worker.kill()
+                worker.future.set_exception(TimeoutError())
             self._dispatch()
         return done
-
-    def _end_late_ones(self) -> None:
-        for worker in [worker for worker in self._workers if time.monotonic() > worker.deadline]:
-            self._workers.remove(worker)
-            worker.kill()
-            worker.future.set_exception(TimeoutError())
 
     def close(self) -> None:
         """End all processes."""

@@ -54,9 +54,8 @@ class _Plan:
         self._sweep, self._there = sweep, there
         self._later = {file: scene.other_end for file, scene in scenes.items() if scene.other_end in scenes}
         places = {file: number * _SPREAD % 1 for number, file in enumerate(scenes)}
-        self._open = collections.deque(
-            sorted(missing, key=lambda file: (places[self._later.get(file, file)], file in self._later))
-        )
+        missing = sorted(missing, key=lambda file: (places[self._later.get(file, file)], file in self._later))
+        self._open = collections.deque(missing)
         self.left_out: list[str] = []
 
     def next(self, running: list[Job]):

@@ -88,10 +88,7 @@ class Computed:
 
 
 def compute_scene(scene: Scene, display: Display) -> Computed:
-    """Return the branch of ``scene``; no file is written.
-
-    Ctrl-C is not caught here: the points so far would be lost with the memory.
-    """
+    """Return the branch of ``scene``; no file is written. Ctrl-C is not caught here: the points so far would be lost."""
     outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""

@@ -126,9 +126,9 @@ class ClosedStage(Stage):
         """A limit is one that the scene sets, not one of the strip."""
         if stop.reason == Reason.TRIVIAL_BRANCH:
             return None
-        return (
-            dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit") if stop.reason == Reason.LIMIT else stop
-        )
+        if stop.reason == Reason.LIMIT:
+            return dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit")
+        return stop
 
     def _explained(self, run: Continuation) -> Stop:
         """Return why a run failed: the end of the law, or that no state was found, with what to change."""

@@ -139,9 +139,7 @@ class SymmetryWatch(Watch):
             if not self._from_circle:
                 beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < levels.DOUBLED
                 return np.nan if beside else float(np.prod(values))
-            if (
-                name[0] == 0 and abs(trial["M2"]) < levels.APART
-            ):  # zeros of rotations of a circle, in place of the phase of the branch
+            if name[0] == 0 and abs(trial["M2"]) < levels.APART:  # zeros of rotations of a circle, not of the branch's phase
                 values = values[np.abs(values) > levels.APART]
             return float(np.prod(values))
 

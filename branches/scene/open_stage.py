@@ -201,10 +201,7 @@ class OpenStage(Stage):
             raise ConfigError(f"numbers: {error}") from error
 
     def _switched(self, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:
-        """Return the settings and the first tangent of a stage that leaves a branch point.
-
-        Raises ConfigError where no single branch leaves it, or not in this stage.
-        """
+        """Return settings and first tangent at a branch point; raise ConfigError if no single branch leaves in this stage."""
         stage = self.stage
         if not origin.is_simple_branch_point:
             raise ConfigError(

@@ -577,12 +577,9 @@ def _stage_in_si_units(stage: object) -> Any:
     if not isinstance(stage, dict):
         return stage
     read = {part: _in_si_units(part, stage[part]) for part in ("numbers", "limits", "label") if part in stage}
-    to = (
-        {"to": _one_in_si_units(f"stage {stage['follow']}: to", stage["follow"], stage["to"])}
-        if "to" in stage and "follow" in stage
-        else {}
-    )
-    return stage | read | to
+    if "to" in stage and "follow" in stage:
+        read["to"] = _one_in_si_units(f"stage {stage['follow']}: to", stage["follow"], stage["to"])
+    return stage | read
 
 
 def _in_si_units(part: str, numbers: object) -> Any:

@@ -76,24 +76,18 @@ def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
         values = kind.prepared(values)
         lists = lists_in(values, kind.LISTS)
         if lists or "pairs" in values and kind.PAIRS:
-            return _sweep(kind, values, lists, name, settings)
-    except ValueError as error:
-        raise ConfigError(f"{name}: {error}") from error
-    return _validated(kind, values, name, settings)
-
-
-def _validated(kind: type[Scene], values: dict, name: str, settings: Sequence[str]) -> Scene:
-    """Return the scene with these values; raise ConfigError with one sentence."""
-    try:
+            return _sweep(kind, values, lists)
         return kind.model_validate(values)
     except ValidationError as error:
         raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, kind)}") from error
+    except ValueError as error:
+        raise ConfigError(f"{name}: {error}") from error
 
 
-def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str, settings: Sequence[str]) -> Sweep:
+def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list]) -> Sweep:
     """Return the scenes of all combinations of the lists' values.
 
-    Raises ValueError or ConfigError for a field that is invalid in every combination, or a combination that is given twice.
+    Raises ValueError for a field that is invalid in every combination, or a combination that is given twice.
     """
     from branches.scene.sweep import Sweep, combinations  # most scenes are of one branch
 
@@ -115,7 +109,7 @@ def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list], name: str,
             one = kind.model_validate(fields)
         except ValidationError as error:
             if error.errors()[0]["loc"]:
-                raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, kind)}") from error
+                raise
             absent[kind.words_of(fields, chosen)] = _sentence(error, kind)
             continue
         file = one.file_of(chosen)
