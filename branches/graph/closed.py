@@ -152,9 +152,7 @@ def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
-        index = covering(
-            *law_of(family["law"], family["nu"]), *(attributes[name] for name in ("kappa_n", "kappa_star", "energy"))
-        )
+        index = covering(*law_of(family["law"], family["nu"]), *(attributes[name] for name in COLUMNS[1:]))
         return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
     branch = f"({family['m']},{family['n']})"
     if origin:
@@ -199,7 +197,7 @@ def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[
     found = {}
     for edge in graph.edges(data=True):
         data = edge[2]
-        if "origin" in data and law in (None, data["law"]) and nu in (None, data["nu"]):
+        if "origin" in data and _is_of(data, law, nu):
             found.setdefault(data["file"], []).append(edge)
     result = []
     for edges in found.values():
@@ -237,6 +235,10 @@ def courses(graph) -> Iterator[tuple[tuple, list[dict]]]:
         yield family, _in_order(graph, edges)
 
 
+def _is_of(data, law: str | None, nu: float | None) -> bool:
+    return law in (None, data["law"]) and nu in (None, data["nu"])
+
+
 def family_of(data) -> tuple:
     return data["law"], data["nu"], data["m"], data["n"]
 
@@ -262,12 +264,11 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     nodes = (data for _, data in graph.nodes(data=True) if data["kind"] == "circle")
     for law_, nu_, m in sorted({(data["law"], data["nu"], data["covering"]) for data in nodes}):
         if (law_, nu_) in materials:
-            found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
-    edges = [
-        (edge, data)
-        for edge, (*_, data) in enumerate(graph.edges(data=True))
-        if law in (None, data["law"]) and nu in (None, data["nu"])
-    ]
+            material, parameters = law_of(law_, nu_)
+            values = circle(material, m, kappa_n, parameters)
+            place = {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
+            found.append({"law": law_, "nu": nu_, "circle": m, **place})
+    edges = [(edge, data) for edge, (*_, data) in enumerate(graph.edges(data=True)) if _is_of(data, law, nu)]
     for number, place in places([data for _, data in edges], "kappa_n", kappa_n, ("arclength", *COLUMNS[2:])):
         edge, data = edges[number]
         left = {"origin": data["origin"]} if "origin" in data else {}
@@ -276,21 +277,13 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
 
 
-def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
-    """Return kappa* and energy of a planar circle."""
-    material, parameters = law_of(law, nu)
-    values = circle(material, m, kappa_n, parameters)
-    return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
-
-
 def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
     """Return the folds with low <= kappa_n <= high, in order of kappa_n; ``secondary`` says of what kind the branch is."""
     nodes = [
         data | {"secondary": any("origin" in edge for *_, edge in graph.edges(name, data=True))}
         for name, data in graph.nodes(data=True)
-        if data["kind"] == "fold" and low <= data["kappa_n"] <= high
+        if data["kind"] == "fold" and low <= data["kappa_n"] <= high and _is_of(data, law, nu)
     ]
-    nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
     return sorted(nodes, key=lambda data: data["kappa_n"])
 
 
@@ -313,9 +306,8 @@ def describe_node(node) -> str:
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
         return f"stops at {node['kappa_n']:.10g}, the scene's own limit"
-    return (
-        f"{node['kind']} at {node['kappa_n']:.6f}{' (' + node['what'] + ')' if node['kind'] == 'end' and node['what'] else ''}"
-    )
+    what = f" ({node['what']})" if node["kind"] == "end" and node["what"] else ""
+    return f"{node['kind']} at {node['kappa_n']:.6f}{what}"
 
 
 # --- the preview: from the exact quadrature, without continuation ----------------------------------------------------

@@ -47,10 +47,7 @@ def edges_of(
 
 
 def add(graph, part: Part) -> bool:
-    """Add a result to a diagram.
-
-    Return False if the diagram has the branch already, computed from its other end: it has both circles that the branch joins.
-    """
+    """Add a result to a diagram; return False if it has the branch from its other end: both circles that the branch joins."""
     if all(values["kind"] == "circle" and name in graph for name, values in (part.nodes[0], part.nodes[-1])):
         return False
     graph.add_nodes_from(part.nodes)

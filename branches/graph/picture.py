@@ -207,11 +207,8 @@ def _inset(axes, graph, law: str, nu: float, found: list[Line], blob: list[Mark]
         return None
     inset = axes.inset_axes(place, zorder=3)
     ends = [mark.kappa_n for mark in blob]
-    around = _AROUND * np.ptp(ends)
-    window, here = (
-        (min(ends) - around, max(ends) + around),
-        [line for line in found if any(mark in blob for mark in line.marks)],
-    )
+    around, here = _AROUND * np.ptp(ends), [line for line in found if any(mark in blob for mark in line.marks)]
+    window = min(ends) - around, max(ends) + around
     circles(inset, graph, law, nu, window)
     for line in here:
         _draw(inset, line, line.kappa_star)
@@ -375,10 +372,8 @@ def legend(graph, law: str, nu: float, window=WINDOW) -> list:
     found = [line for line in lines(graph, law, nu) if np.any(_within(line.kappa_n, window))]
     handles = [Line2D([], [], color=colour_of(n), lw=2, label=f"n = {n}") for n in sorted({line.n for line in found} - {0})]
     published = any(_published_only(law, nu, m) for m in _coverings(graph, law, nu) if m >= 1)
-    words = {
-        "stable": "circle, stable (a minimum of the energy)" if published else "circle, stable",
-        "unstable": "circle, unstable",
-    }
+    minimum = " (a minimum of the energy)" if published else ""
+    words = {"stable": f"circle, stable{minimum}", "unstable": "circle, unstable"}
     words |= {"published": "circle, stable to waves, but it turns inside out"} if published else {}
     handles += [Line2D([], [], **_CIRCLES[kind], label=text) for kind, text in words.items()]
     known = {stable for line in found for stable, part in line.parts() if np.any(_within(line.kappa_n[part], window))}
@@ -417,17 +412,10 @@ def _line(graph, m: int, n: int, edges) -> Line:
     piece = np.searchsorted([data["arclength"][-1] for _, _, data in edges[:-1]], s)
     index = np.array([data.get("index", -1) for _, _, data in edges])[piece]
     kappa_n, kappa_star, index = _refined(kappa_n, kappa_star, index)
-    nodes = (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b)))
-    marks = [
-        Mark(
-            node["kappa_n"],
-            node["kappa_star"],
-            node["kind"],
-            node.get("covering"),
-            node["what"] if node["kind"] == "end" else "",
-        )  # fmt: skip
-        for node in nodes
-    ]
+    marks = []
+    for node in (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b))):
+        what = node["what"] if node["kind"] == "end" else ""
+        marks.append(Mark(node["kappa_n"], node["kappa_star"], node["kind"], node.get("covering"), what))
     line = Line(name, n, kappa_n, kappa_star, index, marks)
     line.marks.sort(key=line.place)
     first, last = line.marks[0].covering, line.marks[-1].covering

@@ -56,10 +56,7 @@ def _lines(data: dict) -> str:
 
 
 def read(folder: str | Path):
-    """Return the diagram in a folder, or in a ``diagram.json``.
-
-    Raises StoreError where there is none, or it is of open strips.
-    """
+    """Return the diagram in a folder or ``diagram.json``; raise StoreError where there is none, or it is of open strips."""
     graph = read_any(folder)
     if graph.graph["format"] != CLOSED_FORMAT:
         raise StoreError(f"{str(folder)!r} is the diagram of open strips; branches.graph and branches.explore show it")

@@ -172,11 +172,12 @@ def finite_width(folder: Path) -> Section:
         found = next(kappa_n for G, kappa_n in fold if abs(G / Gamma - 1) < 1e-9)
         worst = max(worst, abs(found - known.kappa_n))
         rows.append(Row(f"fold of (1, 2) at Γ = {Gamma:g}: κₙL/2π =", "", f"{found:.10f}"))
-    least = fold[np.argmin(fold[:, 1])]
+    least, target = fold[np.argmin(fold[:, 1])], 1.1 * thresholds(RIBBON, 1, 2, NU)[0]
+    near_ribbon = brentq(lambda Gamma: threshold(1, 2, Gamma) - target, 1.0, 1e4)
     rows += [
         Row("fold of (1, 2) exists for Γ above", "", f"{birth[0]:.4f}", f"born at κₙL/2π = {birth[1]:.4f} on the single loop"),
         Row("fold of (1, 2): least κₙL/2π", "", f"{least[1]:.4f}", f"near Γ = {least[0]:.3g}"),
-        Row("first threshold within 10 % of the ribbon's, Γ above", "", f"{_near_ribbon():.4g}", "single loop, (1, 2)"),
+        Row("first threshold within 10 % of the ribbon's, Γ above", "", f"{near_ribbon:.4g}", "single loop, (1, 2)"),
     ]
     notes = [
         f"The folds at Γ = {', '.join(f'{G:g}' for G in CHECKED)} by collocation, on the curve in two parameters, are "
@@ -200,12 +201,6 @@ def threshold(m: int, n: int, Gamma: float) -> float:
         return thresholds(FINITE_WIDTH, m, n, {"nu": NU, "Gamma": Gamma})[0]
     except ValueError:
         return float("nan")
-
-
-def _near_ribbon() -> float:
-    """Gamma above which the first threshold of the single loop is within 10 % of the ribbon's."""
-    target = 1.1 * thresholds(RIBBON, 1, 2, NU)[0]
-    return brentq(lambda Gamma: threshold(1, 2, Gamma) - target, 1.0, 1e4)
 
 
 def fold_over_width() -> tuple[np.ndarray, tuple[float, float]]:

@@ -189,10 +189,8 @@ def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
         raise ValueError(f"xi = {', '.join(f'{xi:g}' for xi in xis)}: must be positive and ascending")
     mesh = _Mesh(strip, RADIUS, math.pi)
     lines = [*mesh.text(), *_material(strip), "*SOLID SECTION,ELSET=STRIP,MATERIAL=M"]
-    inner, outer = (
-        len(mesh.points) + 1,
-        len(mesh.points) + 2,
-    )  # these carry u_x of two layers of the moving end, minus that of its centre
+    inner = len(mesh.points) + 1
+    outer = inner + 1  # these two carry u_x of two layers of the moving end, minus that of its centre
     lines.append(f"*NODE\n{inner},0,-10,0\n{outer},0,-20,0")
     right, left = 0, 2 * strip.along
     centre = mesh.nodes[right, strip.across, 1]

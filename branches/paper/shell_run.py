@@ -159,14 +159,10 @@ def run_ccx(deck: str, time_limit: float, stopped: Callable[[], bool] = lambda: 
         if late:
             return text, f"not finished within {time_limit:g} s"
         if process.returncode:
-            return text, f"{PROGRAM} ended with exit code {process.returncode}{_complaint(folder / 'log')}"
+            lines = (line.strip() for line in (folder / "log").read_text(errors="replace").splitlines())
+            errors = (line.removeprefix("*ERROR").lstrip(": ")[:80] for line in lines if line.startswith("*ERROR"))
+            return text, f"{PROGRAM} ended with exit code {process.returncode}{next((f' ({one})' for one in errors), '')}"
         return text, ""
-
-
-def _complaint(log: Path) -> str:
-    """Return the first error in the log of CalculiX, in brackets."""
-    lines = (line.strip() for line in log.read_text(errors="replace").splitlines())
-    return next((f" ({line.removeprefix('*ERROR').lstrip(': ')[:80]})" for line in lines if line.startswith("*ERROR")), "")
 
 
 class _States:

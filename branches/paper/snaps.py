@@ -47,18 +47,14 @@ class Start:
     published: str
     buckled: bool
 
-    @property
-    def kicks(self) -> tuple[int, ...]:
-        """The signs in which the lowest mode is excited: on a circle one is a shift of the other."""
-        return (1, -1) if self.buckled else (1,)
-
 
 def snaps(folder: Path) -> Section:
     """The table 'from, at kappa_n, snaps to', and the shapes on the way of three of them."""
     rows, films = [], []
     with threadpool_limits(1, "blas"):  # the matrices are small
         for start in _starts():
-            runs = [(metric, sign, *let_go(start.strip, metric, sign)) for metric in METRICS for sign in start.kicks]
+            signs = (1, -1) if start.buckled else (1,)  # on a circle one is a shift of the other
+            runs = [(metric, sign, *let_go(start.strip, metric, sign)) for metric in METRICS for sign in signs]
             rows.append(_row(start, runs))
             if "κₙr₀" in start.published:  # an experiment gave a number
                 films.append((start, runs[0][2]))

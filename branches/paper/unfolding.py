@@ -64,7 +64,9 @@ def _draw(folder: Path) -> str:
         values = np.linspace(0.005, 0.5, 60)
         roots = [first_root(law, value, largest=TOP + 1) for value in values]
         axes.plot(values, [np.nan if root is None else root for root in roots], color="k", lw=1.8)
-    _mark_ribbon(panels[0])
+    nu = np.linspace(0, 0.5, 100)  # hatched where the twisting modulus is negative: the determinant's sign says nothing there
+    panels[0].fill_between(nu, 1 - nu, 1, facecolor="0.85", edgecolor="0.45", hatch="////", linewidth=0)
+    panels[0].plot(nu, 1 - nu, color=STABLE, lw=1.5, ls="--")
     _zoom(panels[1])
     for axes in panels:
         axes.set(xlim=(0, 0.5), xlabel=r"Poisson's ratio $\nu$")
@@ -78,13 +80,6 @@ def _shade(axes, x, y, values):
     axes.pcolormesh(
         x, y, values, cmap=ListedColormap([UNSTABLE_FILL, "white"]), vmin=-1, vmax=1, rasterized=True, shading="nearest"
     )
-
-
-def _mark_ribbon(axes):
-    """Where the twisting modulus is negative: hatched, because the sign of the determinant says nothing there."""
-    nu = np.linspace(0, 0.5, 100)
-    axes.fill_between(nu, 1 - nu, 1, facecolor="0.85", edgecolor="0.45", hatch="////", linewidth=0)
-    axes.plot(nu, 1 - nu, color=STABLE, lw=1.5, ls="--")
 
 
 def _zoom(axes):
