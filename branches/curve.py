@@ -59,13 +59,10 @@ def main(argv=None) -> int:
         (prepare if out.name.endswith(".csv") else check_picture)(out)
         branch = read_branch(options.result)
         point = labelled_point(branch, options.point)
-        found, names = (
-            follow(branch, point, options.against, options.between),
-            (options.against, branch.followed(branch.stage_of[point])),
-        )
-        s, *values = np.transpose(
-            [(one.arclength, *(one[name] * branch.scene.factor(name) for name in names)) for one in found]
-        )
+        found = follow(branch, point, options.against, options.between)
+        names = options.against, branch.followed(branch.stage_of[point])
+        s = np.array([one.arclength for one in found])
+        values = [np.array([one[name] for one in found]) * branch.scene.factor(name) for name in names]
         lines = [f"{x:.10g},{y:.10g},{one.label}\n" for x, y, one in zip(*values, found)]
         table = f"{','.join(map(branch.titled, names))},label\n{''.join(lines)}"
         if out.name.endswith(".csv"):
@@ -87,9 +84,8 @@ def _figure(branch: StoredBranch, names, values):
 
     axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
     axes.plot(*values, color="black")
-    axes.set(
-        xlabel=branch.axis(names[0])[1], ylabel=branch.axis(names[1])[1], title=f"folds of {branch.about.partition(', nu')[0]}"
-    )
+    across, up = (branch.axis(name)[1] for name in names)
+    axes.set(xlabel=across, ylabel=up, title=f"folds of {branch.about.partition(', nu')[0]}")
     return figure
 
 

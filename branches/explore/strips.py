@@ -316,18 +316,13 @@ def _stage_shapes(branch: StoredBranch) -> dict:
     return dict(zip(found, branch.stood(shapes)))
 
 
-def _stage_states(branch: StoredBranch, shapes: dict) -> np.ndarray:
-    """Return every point's states (points, _NODES, strips * 8): those of the strips side by side; lengths are up to 2 pi."""
-    strips = [states_of(one) for one in zip(*(parts_of(shape) for shape in shapes.values()))]
-    for values in strips:
-        values[..., -3:] *= 2 * np.pi / branch.shape_length
-    return filled(branch, list(shapes), np.concatenate(strips, axis=-1))
-
-
 def _stages(
     path: Path, branch: StoredBranch, columns: list[str], shapes: dict, snaps: Mapping[int, str]
 ) -> Iterator[dict]:  # fmt: skip
-    states, unit = _stage_states(branch, shapes), 2 * np.pi / branch.shape_length
+    unit, strips = 2 * np.pi / branch.shape_length, [states_of(one) for one in zip(*map(parts_of, shapes.values()))]
+    for values in strips:
+        values[..., -3:] *= unit  # lengths are up to 2 pi
+    states = filled(branch, list(shapes), np.concatenate(strips, axis=-1))  # those of the strips side by side
     for number in np.unique(branch.stage_of):
         first = next(shape for point, shape in shapes.items() if branch.stage_of[point] == number)
         about = _stage(path, branch, int(number), columns, snaps) | {"shapes": compressed(states[branch.stage_of == number])}

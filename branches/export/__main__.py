@@ -46,10 +46,9 @@ def parser() -> Parser:
         help=f"file to write; may be repeated; the ending chooses the format: {', '.join((*SURFACES, '.csv'))}",
     )  # fmt: skip
     parser.add_argument(
-        "--table",
-        metavar="NAME",
+        "--table", metavar="NAME",
         help="table of all points of the branch in its units (SI where the scene has dimensions), .csv",
-    )
+    )  # fmt: skip
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
     parser.add_argument(
         "--view", nargs=2, type=float, metavar=("AZIMUTH", "ELEVATION"),

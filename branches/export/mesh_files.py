@@ -18,10 +18,7 @@ _COLOUR = (232, 163, 61, 255)
 
 
 def library(ending: str):
-    """Return the library that writes files with this ending.
-
-    Raises StoreError where it is not installed; the message says what to install.
-    """
+    """Return the library that writes files with this ending, or raise StoreError, which says what to install."""
     name = LIBRARIES[ending]
     try:
         return importlib.import_module(name)
@@ -44,9 +41,13 @@ def encode(mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
     fields : mapping of str to ndarray, shape (K, ...)
         Values at the nodes of the centreline; VTK files hold them.
     """
-    if LIBRARIES[ending] == "meshio":
-        return _by_meshio(library(ending), mesh, ending, fields)
-    return _by_trimesh(library(ending), mesh, ending)
+    if LIBRARIES[ending] == "trimesh":
+        return _by_trimesh(library(ending), mesh, ending)
+    meshio, values = library(ending), {name: np.ascontiguousarray(field[mesh.stations]) for name, field in fields.items()}
+    with tempfile.TemporaryDirectory() as folder:  # meshio writes to files only
+        path = Path(folder) / f"strip{ending}"
+        meshio.write(path, meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], point_data=values))
+        return path.read_bytes()
 
 
 def _by_trimesh(trimesh, mesh: Mesh, ending: str) -> bytes:
@@ -67,11 +68,3 @@ def _by_trimesh(trimesh, mesh: Mesh, ending: str) -> bytes:
     else:
         data = result.export(file_type=ending[1:])
     return data.encode() if isinstance(data, str) else data
-
-
-def _by_meshio(meshio, mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
-    values = {name: np.ascontiguousarray(field[mesh.stations]) for name, field in fields.items()}
-    with tempfile.TemporaryDirectory() as folder:  # meshio writes to files only
-        path = Path(folder) / f"strip{ending}"
-        meshio.write(path, meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], point_data=values))
-        return path.read_bytes()

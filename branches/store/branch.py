@@ -195,9 +195,8 @@ class StoredBranch(ABC):
         for piece in self.pieces():
             own = np.flatnonzero(self.stage_of == piece.stage)
             before, behind = corners[corners <= piece.rows[0]], corners[corners >= piece.rows[-1]]
-            own = own[
-                (own >= before.max(initial=0)) & (own <= behind.min(initial=len(self.points)))
-            ]  # a curve bends at a corner
+            between = (own >= before.max(initial=0)) & (own <= behind.min(initial=len(self.points)))
+            own = own[between]  # a curve bends at a corner
             s = self.points["arclength"][own]
             fine, *curve = smooth(s, s, *(column[own] for column in columns))
             first, last = s[piece.rows[[0, -1]] - own[0]]

@@ -96,13 +96,10 @@ class ClosedBranch(StoredBranch):
         for event in self.events:
             letters = event["label"].decode()
             kind = kind_of(letters, name := event["name"].decode(), self.reason, bool(self.scene.origin))
+            word = _WORDS.get(kind, f"end: {name}" if kind == "end" and name else kind)
             strip = self.scene.strip if kind == "user value" else None
-            natural = strip and math.isclose(event["kappa_n"], Strip(**strip).kappa_n)
-            word = (
-                "natural curvature of the strip"
-                if natural
-                else _WORDS.get(kind, f"end: {name}" if kind == "end" and name else kind)
-            )
+            if strip and math.isclose(event["kappa_n"], Strip(**strip).kappa_n):
+                word = "natural curvature of the strip"
             yield Mark(int(event["point"]), label_of(letters), kind == "leaves", word)
 
     def colour(self, stage: int) -> str:

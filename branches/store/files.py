@@ -31,10 +31,7 @@ def another_scene(folder: Path, reason: str) -> StoreError:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Replace the file ``path`` (or the file it links to) as a whole, with its mode, or leave it unchanged.
-
-    Raises StoreError where it cannot be written.
-    """
+    """Replace a file, or the one it links to, as a whole, with its mode; or leave it unchanged and raise StoreError."""
     try:
         with interrupt.held():
             write_whole(path, data)
@@ -189,10 +186,7 @@ interrupt.at_last(unlock_all)
 
 
 def prepare(path: Path) -> None:
-    """Make the folder of ``path``, check that a result can be written, and remove files of killed runs.
-
-    Raises StoreError where nothing can be written there.
-    """
+    """Make the folder of ``path``, remove files of killed runs; raise StoreError where no result can be written there."""
     path = Path(os.path.realpath(path))
     try:
         if path.parent.exists() and not path.parent.is_dir():

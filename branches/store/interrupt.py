@@ -59,12 +59,8 @@ def run(main: Callable[[], int]) -> int:
     try:
         return main()
     except (Exception, KeyboardInterrupt) as error:
-        if _State.raised or isinstance(error, KeyboardInterrupt):
-            return _interrupted()
-        raise
-
-
-def _interrupted() -> int:
+        if not (_State.raised or isinstance(error, KeyboardInterrupt)):
+            raise
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
     _say()
     if os.getpid() == _State.process:  # after exec() Python would end by the signal, not with the code

@@ -50,10 +50,7 @@ def _require(fact: object, what: str) -> None:
 
 
 def check(file: h5py.File, path: Path) -> None:
-    """See that a file is a branch that can be read.
-
-    Raises StoreError where it is none, one of another version, or damaged; with what is wrong.
-    """
+    """See that a file is a branch that can be read; raise StoreError where it is none, of another version, or damaged."""
     if file.attrs.get("format") != FORMAT:
         raise StoreError(f"cannot read {str(path)!r}: it is not a branch written by this program")
     found = file.attrs["format_version"]

@@ -259,10 +259,7 @@ def _extend(dataset, rows):
 
 @contextlib.contextmanager
 def open_branch(path: Path):
-    """Open the HDF5 file of a branch for reading.
-
-    Raises StoreError where the file does not exist, is not HDF5, or is not a branch that this version reads.
-    """
+    """Open the file of a branch; raise StoreError where it does not exist, is not HDF5, or no branch this version reads."""
     try:
         file = h5py.File(path, "r")
     except OSError as error:

@@ -73,7 +73,7 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
         *assumptions(strip, rings, yield_strain),
         "",
         f"{'circle  radius mm  stable for natural radii (mm)':57s}  {'here':14s}  moment N m   energy J  strain",
-        *(_circle_line(strip, ring, yield_strain) for ring in rings),
+        *(f"{ring.m:6d}  {_radii(strip, ring.m)}  {_numbers(ring, yield_strain)}" for ring in rings),
         *(
             f"{name}, where its stable state ends: natural radius {1e3 * strip.radius(value):.4g} mm"
             for name, value in folds[:1]
@@ -105,19 +105,15 @@ def assumptions(strip: Strip, rings: list[State], yield_strain: float | None = N
             yield f"caution: strains beyond the yield strain {yield_strain:g} (marked !): {', '.join(beyond)}"
 
 
-def _circle_line(strip: Strip, ring: State, yield_strain) -> str:
-    radius = 1e3 * strip.radius(ring.m)
-    return f"{ring.m:6d}  {radius:9.1f}  {_natural_radii(strip, ring.m):38s}  {_numbers(ring, yield_strain)}"
-
-
-def _natural_radii(strip: Strip, m: int) -> str:
-    """Return the natural radii for which the m-fold circle is stable."""
+def _radii(strip: Strip, m: int) -> str:
+    """Return the radius of the m-fold circle, and the natural radii for which it is stable."""
     low, high = (m * end for end in linear.energy_interval(FINITE_WIDTH, m, strip.parameters))
     least = "0" if high == math.inf else f"{1e3 * strip.radius(high):.4g}"
-    if low > 0:
-        return f"{least} ... {1e3 * strip.radius(low):.4g}"
     reverse = "" if low == -math.inf else f" over {-1e3 * strip.radius(low):.4g}"
-    return f"over {least}, straight, reversed{reverse}" if low < 0 else f"over {least}, straight"
+    natural = f"over {least}, straight, reversed{reverse}" if low < 0 else f"over {least}, straight"
+    if low > 0:
+        natural = f"{least} ... {1e3 * strip.radius(low):.4g}"
+    return f"{1e3 * strip.radius(m):9.1f}  {natural:38s}"
 
 
 def _numbers(state: State, yield_strain) -> str:
@@ -146,10 +142,8 @@ def lost_lines(modes: list[tuple[int, int]]) -> Iterator[str]:
 def _fate(rings: list[State], stable_others: list[State]) -> Iterator[str]:
     """Yield whether the single loop is stable, and the stable states of less energy; the ways there are not computed."""
     single = rings[0]
-    below = sorted(
-        (state for state in (*rings[1:], *stable_others) if state.stable and state.energy < single.energy),
-        key=lambda state: state.energy,
-    )
+    below = [state for state in (*rings[1:], *stable_others) if state.stable and state.energy < single.energy]
+    below.sort(key=lambda state: state.energy)
     ends = ", ".join(f"{state.name} ({single.energy - state.energy:.3g} J less)" for state in below) or "nothing found here"
     if below or not single.stable:
         yield f"the single loop is {'stable' if single.stable else 'unstable'}; stable states of less energy: {ends}"
@@ -233,17 +227,19 @@ def dimensions(strip: Strip, m: int, wanted: float, quiet: bool = True) -> str:
 
 def _line(strip: Strip, name: str, m: int, wanted: float) -> str:
     places, values = _scan(strip, name, m)
-    found = list(_solutions(strip, name, m, wanted, places, values))
+    found = [
+        brentq(lambda value: _changed(strip, name, value, m) - wanted, a, b, rtol=_PRECISION)
+        for a, b, low, high in zip(places, places[1:], values, values[1:]) if (low - wanted) * (high - wanted) <= 0
+    ]  # fmt: skip
     title = f"  {name.replace('_', ' '):15s}"
     if found:
         return title + " or ".join(f"{1e3 * value:.4g} mm" for value in found)
+    none = f"{title}none between {1e3 * places[0]:.4g} and {1e3 * places[-1]:.4g} mm"
     if np.all(np.isnan(values)):
-        return title + f"none between {1e3 * places[0]:.4g} and {1e3 * places[-1]:.4g} mm: it is not stable there"
+        return f"{none}: it is not stable there"
     best = int(np.nanargmax(values))
-    return title + (
-        f"none between {1e3 * places[0]:.4g} and {1e3 * places[-1]:.4g} mm; at the places tried the barrier lies between "
-        f"{np.nanmin(values):.3g} and {values[best]:.3g} J (at {1e3 * places[best]:.4g} mm)"
-    )
+    largest = f"{values[best]:.3g} J (at {1e3 * places[best]:.4g} mm)"
+    return f"{none}; at the places tried the barrier lies between {np.nanmin(values):.3g} and {largest}"
 
 
 def _scan(strip: Strip, name: str, m: int) -> tuple[np.ndarray, np.ndarray]:
@@ -260,12 +256,6 @@ def _changed(strip: Strip, name: str, value: float, m: int) -> float:
         return barrier(dataclasses.replace(strip, **{name: value}), m)
     except ValueError:  # wider than long, or thicker than wide
         return math.nan
-
-
-def _solutions(strip: Strip, name: str, m: int, wanted: float, places, values) -> Iterator[float]:
-    for (a, b), (low, high) in zip(zip(places, places[1:]), zip(values, values[1:])):
-        if (low - wanted) * (high - wanted) <= 0:
-            yield brentq(lambda value: _changed(strip, name, value, m) - wanted, a, b, rtol=_PRECISION)
 
 
 # --- the chart --------------------------------------------------------------------------------------------------------

@@ -145,10 +145,7 @@ def _state(strip: Strip, name: str, point, equilibrium: Equilibrium) -> State:
 
 
 def ways_out(states: Sequence[State], quiet: bool = True) -> dict[str, Barrier]:
-    """Return the barrier in J of each stable state, by name, over the given states of index 1.
-
-    Unless ``quiet``, a line of progress is shown.
-    """
+    """Return the barrier in J of each stable state by name, over given states of index 1; ``quiet``: no line of progress."""
     stable, saddles = [state for state in states if state.stable], [state for state in states if state.index == 1]
     found = []
     with Progress("ways out", len(saddles), quiet) as progress:
