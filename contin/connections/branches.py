@@ -50,7 +50,8 @@ def homoclinic_points(system: ConnectionCollocation) -> list[Event]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
-    near = Event("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True)
+    far = "the ends of the orbit are far from the saddle: it needs a longer time"
+    near = Event("EP", far, lambda trial: _FAR - trial["gap"], terminal=True)
     if system.problem.saddle_node:
         others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
         return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
@@ -77,10 +78,6 @@ def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> Event | 
     return min(found, key=lambda test: abs(test.function(trial)), default=None)
 
 
-def _closeness(trial: Trial) -> float:
-    return _FAR - trial["gap"]
-
-
 def _slow_component(trial: Trial, end: int) -> float:
     """Return c at an end of an orbit to a saddle-node, with the sign of a: positive where the slow motion leaves."""
     p, bend = trial.system.slow_motion(trial.x)
@@ -89,13 +86,8 @@ def _slow_component(trial: Trial, end: int) -> float:
 
 #: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
 _NON_CENTRAL = tuple(
-    Event(
-        "NCH",
-        "non-central homoclinic orbit to a saddle-node",
-        (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)),
-        terminal=True,
-    )  # fmt: skip
-    for end in (0, 1)
+    Event("NCH", "non-central homoclinic orbit to a saddle-node", function, terminal=True)
+    for function in (lambda trial: _slow_component(trial, 0), lambda trial: -_slow_component(trial, 1))
 )
 
 

@@ -104,7 +104,7 @@ class ConnectionCollocation(Collocation):
 
     def _places(self, p: Array) -> list[Array]:
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
-        n, first = self._n, self._first_coordinate
+        n, first = self._n, list(self.problem.parameters).index(self.problem.multipliers[0])
         if not self.problem.homoclinic:
             return [p[:, place : place + n] for place in (first, first + n)]
         here = p[:, first : first + n]
@@ -115,11 +115,6 @@ class ConnectionCollocation(Collocation):
             gained[:, self.problem.state_names.index(name)] = period * p[:, names.index(WINDING + name)]
         return [here, here + gained]
 
-    @functools.cached_property
-    def _first_coordinate(self) -> int:
-        """Where the coordinates of the equilibria begin among all parameters."""
-        return list(self.problem.parameters).index(self.problem.multipliers[0])
-
     def _jacobians_at(self, places: Array, p: Array, directions: Sequence[Array] = ()) -> Array:
         """Return the derivatives of the field by the states at places, scaled, or theirs along directions of all inputs."""
         batch, n, sizes = self.problem.batch("vector field"), self._n, self.scales.states
@@ -127,10 +122,7 @@ class ConnectionCollocation(Collocation):
         return batch.jacobian_along(*given, directions)[:, :n] * sizes / sizes[:, None]
 
     def _linear_at_ends(self, p: Array) -> list[_Linear]:
-        """Return the linearized fields at both equilibria, once for values of all parameters.
-
-        Raises ConvergenceError where a Jacobian is not finite.
-        """
+        """Return the linearized fields at both ends, once for values of all parameters; or raise ConvergenceError."""
 
         def made(place: Array) -> _Linear:
             (jacobian,) = self._jacobians_at(place, p)

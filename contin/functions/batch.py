@@ -71,13 +71,9 @@ class Recorded:
 
     def sized(self, inputs: Array, values: Array) -> Recorded:
         """Return the same functions of inputs divided by sizes, with their values divided by theirs."""
-        found: Recorded = copy.copy(self._once("divided", self._divided))
+        found: Recorded = copy.copy(self._once("divided", lambda: self._of(sized(self.recording))))  # what all sizes share
         found._behind = np.concatenate([inputs, values])
         return found
-
-    def _divided(self) -> Recorded:
-        """Return what functions with sizes share."""
-        return self._of(sized(self.recording))
 
     def _of(self, recording: Recording, sides: int = 0) -> Recorded:
         found = copy.copy(self)

@@ -79,10 +79,8 @@ class Search:
 
     def partials(self, tape: Tape, index: int, operands: Sequence[Number]) -> list[Any]:
         """Return the derivatives of one unknown by what the equations read."""
-        found = tape.kept(
-            ("implicit", self, tuple(operand.place for operand in operands)), lambda: self._implicit(tape, operands)
-        )
-        return [column[index] for column in found]
+        key = ("implicit", self, tuple(operand.place for operand in operands))
+        return [column[index] for column in tape.kept(key, lambda: self._implicit(tape, operands))]
 
     def _implicit(self, tape: Tape, operands: Sequence[Number]) -> list[list[Any]]:
         """Return the derivatives of all unknowns by each operand."""
@@ -299,10 +297,7 @@ def _tape_of(function: Callable[..., Any], starts: Sequence[Any]) -> Tape | None
 def recorded_search(
     tape: Tape, function: Callable[..., Any], starts: Sequence[Any], minimal: bool
 ) -> tuple[Search, list[Number]]:
-    """Return the search for unknowns on a tape, and the numbers that its equations read.
-
-    Raises Unrecordable for a search within a search.
-    """
+    """Return a search for unknowns on a tape, and the numbers that it reads; raise Unrecordable for one within a search."""
     k = len(starts)
     unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
     tape.searches += 1
@@ -336,10 +331,7 @@ def search_of(tape: Tape, unknowns: Sequence[int], values: Sequence[int], starts
 
 
 def operands_of(tape: Tape, search: Search) -> list[Number]:
-    """Return what the equations of a search read besides its unknowns, and the starts.
-
-    Raises Unrecordable for a search within a search.
-    """
+    """Return what a search reads besides its unknowns, and the starts; raise Unrecordable for a search within a search."""
     depends = tape.reading(search.results, search.unknowns)
     operands: dict[int, None] = {}
     for place in tape.needed(search.results):

@@ -35,10 +35,7 @@ def part(value: Any, name: str) -> Any:
 
 
 def function_of_complex(name: str, value: Any) -> Any:
-    """Return a function of a complex number, recorded or not.
-
-    Raises Unrecordable where the operation of this name has no rule for it.
-    """
+    """Return a function of a complex number, recorded or not; raise Unrecordable where the operation has no rule for it."""
     pair = TABLE[name].pair
     if pair is None:
         raise Unrecordable(f"it calls {name} of a complex number")

@@ -291,10 +291,7 @@ def _sentence(error: Exception) -> str:
 
 
 def _compare(function: UserFunction, signature: Signature, recording: Recording, places: Sequence[int]) -> None:
-    """Compare values of the tape with those of Python, at a few places where Python has some.
-
-    Raises Unrecordable where they differ.
-    """
+    """Compare values of the tape with those of Python, at a few places where it has some; raise Unrecordable if they differ."""
     random = draws.generator("recording")
     for center in PROBES[:3]:
         inputs = (center + 0.1 * random.uniform(-1, 1, signature.inputs)).tolist()

@@ -121,10 +121,7 @@ def component_count(names: Any) -> int:
 
 
 def argument_count(function: Function) -> int:
-    """Return the number of arguments of a user's function that have no default.
-
-    Raises ProblemError where it is no function, or one that does not say.
-    """
+    """Return how many arguments of a user's function have no default; raise ProblemError if it is none, or does not say."""
     try:
         given = inspect.signature(getattr(function, "py_func", function)).parameters.values()
     except (TypeError, ValueError):

@@ -123,10 +123,7 @@ def _flat(argument: object) -> list[Any]:
 
 
 def prepared(function: object) -> Any:
-    """Return a copy of a function that takes recorded numbers.
-
-    Raises Unrecordable where it is no plain Python function, or one that catches exceptions.
-    """
+    """Return a copy of a function for recorded numbers; raise Unrecordable if it is no plain Python, or catches exceptions."""
     return _Copies().function(function)
 
 
@@ -399,10 +396,6 @@ def _of_complex(name: str) -> Callable[[Any], Any]:
     return lambda z: function_of_complex(name, complex_number(z.tape, z))
 
 
-def _copysign(x: Any, y: Any) -> Any:
-    return abs(x) * operation("sign")(operation("sign")(y) + 0.5)
-
-
 def _distance(p: Sequence[Any], q: Sequence[Any]) -> Any:
     difference = [a - b for a, b in zip(p, q)]
     return operation("sqrt")(scalar_product(difference, difference))
@@ -419,7 +412,8 @@ def _hypot(*values: object) -> Any:
 #: Functions of recorded numbers by the functions that they stand for: operations under their own names, and others.
 _OF_NUMBERS: dict[Any, Callable[..., Any]] = {getattr(math, name): operation(name) for name in TABLE if hasattr(math, name)}
 _OF_NUMBERS |= {
-    math.log: _log, math.hypot: _hypot, math.pow: UFUNCS["power"], math.copysign: _copysign, math.fabs: abs,
+    math.log: _log, math.hypot: _hypot, math.pow: UFUNCS["power"], math.fabs: abs,
+    math.copysign: lambda x, y: abs(x) * operation("sign")(operation("sign")(y) + 0.5),
     math.radians: UFUNCS["radians"], math.degrees: UFUNCS["degrees"], math.ldexp: lambda x, n: x * 2.0**n,
     math.isfinite: UFUNCS["isfinite"], math.isnan: UFUNCS["isnan"], math.dist: _distance,
     math.fmod: lambda x, y: x - y * operation("trunc")(x / y), cmath.phase: FUNCTIONS[np.angle],

@@ -28,10 +28,7 @@ from contin.functions import primitives
 
 
 class Unrecordable(BaseException):
-    """A function needs what a recorded number does not have, such as its value.
-
-    It is no ``Exception``, so that a user's function does not catch it.
-    """
+    """A function needs what recorded numbers lack, such as a value; no ``Exception``: a user's function must not catch it."""
 
 
 class Operation(NamedTuple):

@@ -260,14 +260,6 @@ def _forward_points(factors, n, part, vectors):
 
 
 @helper(inline=True)
-def _solve_dense(factors, x):
-    """Solve stage 3: replace the right-hand sides by [mesh points where segments begin or end | parameters]."""
-    block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
-    _forward(block, step, factors.pivots_dense, x)
-    _backward(block, step, x, x)
-
-
-@helper(inline=True)
 def _backward_points(factors, n, part, vectors):
     """Solve for the mesh points inside a segment, the last first, with [first point | next point | parameters] ``known``."""
     rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
@@ -308,7 +300,9 @@ def _solve_joint(factors, sizes, starts, place):
         _add(joint.border, vectors.border, r)
     _move(entry(joint.dense, end), joint.rest, n + k - r)
     _move(entry(joint.dense, end + n + k - r), joint.border, r)
-    _solve_dense(factors, joint.dense)
+    block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
+    _forward(block, step, factors.pivots_dense, joint.dense)
+    _backward(block, step, joint.dense, joint.dense)
     _move(joint.rest, entry(joint.dense, end), n + k)
     for s in range(segments):
         vectors, begins = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.dense, s * n)
@@ -388,14 +382,6 @@ def _points_transposed(factors, n, part, vectors):
 
 
 @helper(inline=True)
-def _solve_dense_transposed(factors, x):
-    """Solve the transpose of stage 3: replace these unknowns by the multipliers of its rows."""
-    block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
-    _forward_transposed(block, step, x, x)
-    _backward_transposed(block, step, factors.pivots_dense, x)
-
-
-@helper(inline=True)
 def _multipliers_of_points(factors, n, part, vectors):
     """Apply the transpose of stage 2: fill each ``pair`` with the multipliers of its rows."""
     rows, step, r = factors.local.shape[1], point_step(n, factors.chain.shape[2]), factors.border.shape[1]
@@ -442,7 +428,9 @@ def _solve_joint_transposed(factors, sizes, starts, place):
         _add(begins, vectors.given, n)
         _add(entry(begins, n), entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
         _add(entry(joint.dense, end + n), entry(vectors.known, 2 * n), k)
-    _solve_dense_transposed(factors, joint.dense)
+    block, step = at(factors.dense, 0, 0), whole_step(factors.dense.shape[0])
+    _forward_transposed(block, step, joint.dense, joint.dense)
+    _backward_transposed(block, step, factors.pivots_dense, joint.dense)
     _move(joint.rest, entry(joint.dense, end), n + k)
     for s in range(segments):
         vectors = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s)
@@ -575,10 +563,6 @@ class Factorization:
         else:
             for first in range(0, len(rows), LANES):
                 these = slice(first, first + LANES)
-                run(
-                    kernel,
-                    (self._layout, self.room.factors, rows[these], result[these], self.room.work),
-                    self._whole,
-                    (True, False, True),
-                )
+                given_here = (self._layout, self.room.factors, rows[these], result[these], self.room.work)
+                run(kernel, given_here, self._whole, (True, False, True))
         return result.reshape(given.shape)

@@ -167,10 +167,7 @@ def reduce_column(builder: Builder, pivot: Rows, count: int, column: int, size: 
 
 @instruction
 def invert_triangles(builder: Builder, block: Rows, count: int) -> None:
-    """Put the inverses in place of both triangles of a block (count, count), the lower one with ones on its diagonal.
-
-    ``count`` <= `PANEL`.
-    """
+    """Put the inverses in place of both triangles of a block (count, count), the lower with unit diagonal; count <= `PANEL`."""
 
     def write(size: int) -> None:
         places = [[_right(builder, row, c) for c in range(size)] for row in _rows(builder, block, size)]

@@ -163,10 +163,7 @@ class Mass:
 
     @classmethod
     def of(cls, mass: Any, names: Sequence[str]) -> Mass:
-        """Return a matrix, or its diagonal, analysed.
-
-        Raises ProblemError where it is neither, or too many states have no rates.
-        """
+        """Return a matrix or diagonal, analysed; raise ProblemError where it is neither, or too many states have no rates."""
         n = len(names)
         given = mass.toarray() if hasattr(mass, "toarray") else mass
         try:
@@ -244,10 +241,7 @@ class Mass:
         return _of(of_kept, arguments)
 
     def check_index(self, jacobian: Array, names: Sequence[str]) -> None:
-        """Check that z is determined at a place, by F_u there (n, n).
-
-        Raises ProblemError where the derivative of L2 F by z is singular.
-        """
+        """Check that F_u (n, n) determines z at a place; raise ProblemError where the derivative of L2 F by z is singular."""
         by_found = jacobian[:, self.found] - jacobian[:, self.kept] @ np.reshape(self.others, (len(self.kept), -1))
         by_found = np.array(self.algebraic) @ by_found
         if not np.isfinite(by_found).all():

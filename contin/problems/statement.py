@@ -294,10 +294,7 @@ TIME = "time"
 
 
 def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
-    """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
-
-    Raises ProblemError where it is no whole number, or free.
-    """
+    """Return after how many rounds a cycle of a forced system or a map closes; raise ProblemError if not whole, or free."""
     rounds = parameters[ROUNDS]
     if ROUNDS in free:
         raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")

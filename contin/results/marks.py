@@ -17,10 +17,7 @@ else:
 
 
 def new_axes(count: int = 1) -> Any:
-    """Return the axes of a new figure: one, or an array of some, side by side.
-
-    Raises ImportError where matplotlib is not installed.
-    """
+    """Return the axes of a new figure, one or an array side by side; raise ImportError where matplotlib is not installed."""
     try:
         from matplotlib import pyplot
     except ImportError as error:

@@ -85,10 +85,7 @@ def column(points: Sequence[Point], name: str) -> Array:
 
 
 def value(point: Point | Trial, name: str) -> float:
-    """Return a parameter, a functional, a state of equilibria, its largest or smallest value, or the norm.
-
-    Raises KeyError where there is none of this name.
-    """
+    """Return a parameter, functional, state of equilibria, its largest or smallest value, or the norm; or raise KeyError."""
     system = point.system
     states, extreme = system.named_states, name[:3]
     if name in (*system.problem.parameters, *system.problem.functionals, *states) or name not in ("norm", *_extremes(states)):

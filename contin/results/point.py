@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
 
 def underlying(point: Point) -> Point:
-    """Return the solution itself of a point of a curve in two parameters, labelled by what the curve consists of.
-
-    Other points are returned as they are.
-    """
+    """Return the solution of a point of a curve in two parameters, labelled by what it consists of; others as they are."""
     curve: Any = point.system
     if not curve.on_curve:
         return point

@@ -71,10 +71,7 @@ def system_of(point: Record, what: str) -> System:
 
 
 def over_t(point: Record, otherwise: str) -> Collocation:
-    """Return the system of a solution over t.
-
-    Raises ProblemError where it is no function of t; the sentence says ``otherwise``.
-    """
+    """Return the system of a solution over t; raise ProblemError, which says ``otherwise``, where it is no function of t."""
     system: Any = point.system
     if not system.is_function_of_t:
         raise ProblemError(otherwise)

@@ -90,14 +90,9 @@ def _through_corners(system: Algebraic, x: Array, newton: Newton) -> Corrected |
     guess, ends = np.array([*system.states(x)[0], *(known[name] for name in system.free), 0.0]), list[str]()
     for direction in (1, -1):
         settings = Settings(
-            limits={t: (-np.inf, 1.0)},
-            direction=direction,
-            newton=newton,
-            branch_points=False,
-            errors=False,
-            max_points=_MOST_OF_WAY,
-            primary=t,
-        )
+            limits={t: (-np.inf, 1.0)}, direction=direction, newton=newton, branch_points=False, errors=False,
+            max_points=_MOST_OF_WAY, primary=t,
+        )  # fmt: skip
         with contextlib.suppress(ConvergenceError):
             last = list(Continuation(Algebraic(way, [*system.free, t]), guess, settings))[-1]
             if last[t] == 1:

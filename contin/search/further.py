@@ -80,10 +80,7 @@ def evenly(system: Any) -> Discretization:
 
 
 def are_one(first: Solution, second: Solution, symmetries: Sequence[Symmetry], tolerance: float) -> bool:
-    """Return whether a solution is another one, or its image under one of the symmetries, compared on a uniform mesh.
-
-    Both have the same free parameters.
-    """
+    """Return whether a solution is another one, or an image of it, on a uniform mesh; both have the same free parameters."""
     system = evenly(first[0])
     there = seen(system, first[0].carrier(system)(first[1]))
     other = second[0].carrier(system)(second[1])

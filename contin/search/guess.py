@@ -275,10 +275,7 @@ def first_guess(
     problem: BoundaryValueProblem | AlgebraicProblem, guess: Parsed, parameters: Mapping[str, float], free: Sequence[str],
     intervals: int, degree: int,
 ) -> tuple[System, Array]:  # fmt: skip
-    """Return the discretized problem and a vector of unknowns for a guess.
-
-    Raises ProblemError for a guess that does not fit.
-    """
+    """Return the discretized problem and a vector of unknowns for a guess; raise ProblemError for a guess that does not fit."""
     values, count, point = {**problem.parameters, **parameters}, len(problem.state_names), guess.point
     if isinstance(problem, AlgebraicProblem):
         algebraic = problem.discretized(free, parameters)

@@ -100,10 +100,7 @@ class GrownOrbit:
 
 
 class _Saddle:
-    """The saddle of a point, and the single unstable or stable direction that orbits are grown along.
-
-    Raises ProblemError where it has none.
-    """
+    """The saddle of a point and its single unstable or stable direction, for orbits; raise ProblemError where it has none."""
 
     def __init__(self, point: Point, name: str) -> None:
         system: Any = point.system
@@ -130,10 +127,7 @@ class _Saddle:
         return Algebraic(self.problem, (), values)
 
     def at(self, value: float, guess: Array) -> tuple[Array, Array, Array, float]:
-        """Return the saddle at a value of the parameter, q and p with p.q = 1, and the eigenvalue.
-
-        Raises ConvergenceError where it is not found.
-        """
+        """Return the saddle at a value of the parameter, q and p with p.q = 1, the eigenvalue; or raise ConvergenceError."""
         system = self._algebraic({**self.values, self.name: value})
         rest = nearest_zero(lambda u: (system.residual(u), system.jacobian(u)), guess)
         if rest is None:

@@ -128,23 +128,18 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     forget_changed(problem)
     problem, start, parameters = restated(problem, guess, _checked(parameters))
-    _check_others(problem, others)
+    if any(system_of(other, "others").problem.states != problem.states for other in others):
+        raise ProblemError("others: must be solutions of this problem")
     free = with_multipliers(problem, free)
     if start.point is not None:
         read = winding_names(problem.angles)  # off the guess, as of all others
-        known = {name: value for name, value in start.point.parameters.items() if name not in read}
-        parameters = {**known, **parameters}
+        parameters = {name: value for name, value in start.point.parameters.items() if name not in read} | parameters
     held = _check_count(problem, free)
     degree = degree or _degree_of(problem, start.point, control)
     system, x = first_guess(problem, start, parameters, free, intervals, degree)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return solved(*_sized(system, x), control, newton, others, held, explains=True)
-
-
-def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
-    if any(system_of(other, "others").problem.states != problem.states for other in others):
-        raise ProblemError("others: must be solutions of this problem")
 
 
 def _degree_of(problem: BoundaryValueProblem | AlgebraicProblem, point: Point | None, control: MeshControl) -> int:

@@ -69,10 +69,7 @@ _HALF = 7.0
 
 
 class Takens:
-    """The normal form of a Bogdanov-Takens point of a system with two free parameters, in the user's units.
-
-    Raises ProblemError where it is degenerate.
-    """
+    """The normal form of a Bogdanov-Takens point in two parameters, in the user's units; ProblemError if degenerate."""
 
     def __init__(self, base: Algebraic, x: Array) -> None:
         self.base, self.x, self.n = base, x, base.state_size
