@@ -70,9 +70,8 @@ def with_supports(
     for name, end in network.held.items():
         values |= {number: x for number, x in held_at(network, point, name, end).items() if number in values}
     values = balanced(network, states, values, unknown, network.unbalanced(point)) | dict(numbers or {})
-    system = Collocation(
-        network.problem, point.system.mesh, point.system.degree, (follow, *network.problem.multipliers), values
-    )
+    free = follow, *network.problem.multipliers
+    system = Collocation(network.problem, point.system.mesh, point.system.degree, free, values)
     return system, system.pack(states, values)
 
 
@@ -120,10 +119,7 @@ def angles_near(q, near) -> tuple[float, float, float]:
 
 
 def corrected(network: Network, near: Collocation, states: np.ndarray, values: Mapping[str, float]) -> Point:
-    """Return the state of a network with these numbers next to given states (K, 2n) at the nodes of a system.
-
-    Raises ConvergenceError where there is none nearby.
-    """
+    """Return the state with these numbers next to given ones (K, 2n) at the nodes of a system; or raise ConvergenceError."""
     multipliers = network.problem.multipliers
     values = fitted(network, states, dict(values), multipliers)[0]
     system = Collocation(network.problem, near.mesh, near.degree, multipliers, values)

@@ -313,10 +313,8 @@ def refine(point, digits):
 
     z = point.coordinates
     steps = 1e-5 * np.eye(2)
-    slopes = [
-        (conditions(coarse, z + e, point.kappa_n, FLOAT) - conditions(coarse, z - e, point.kappa_n, FLOAT)) for e in steps
-    ]
-    inverse = np.linalg.inv(np.array(slopes).T / 2e-5)
+    ahead, behind = (np.array([conditions(coarse, z + e, point.kappa_n, FLOAT) for e in sign * steps]) for sign in (1, -1))
+    inverse = np.linalg.inv((ahead - behind).T / 2e-5)
     with mpmath.workdps(digits + 10):
         numerics = Numerics(digits + 4)
         fine = type(coarse)(point.m, point.n, mpmath.mpf(repr(point.nu)), point.root)

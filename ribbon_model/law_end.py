@@ -152,9 +152,8 @@ def _least_margin(section: Section, place: Place, trial: Trial) -> float:
 
     def margins(times: np.ndarray) -> np.ndarray:
         states = system.evaluate(x, times).T
-        return section.margin(
-            place.part(times), moment_on_directors(states[frame], states[moment]).T, np.empty((len(times), 0)), p
-        )
+        moments = moment_on_directors(states[frame], states[moment]).T
+        return section.margin(place.part(times), moments, np.empty((len(times), 0)), p)
 
     times = system.nodes
     values = margins(times)

@@ -210,11 +210,8 @@ class NetworkChain:
         for member, piece in zip(self.network.members.values(), self.pieces):
             section = self.network.sections[member.section]
             t = member.part((np.arange(len(piece.strains)) + 0.5) / len(piece.strains))
-            found.append(
-                section.strain_energy(
-                    t, piece.strains, SimpleNamespace(**self.network.numbers_of(member.section, self.numbers))
-                )
-            )
+            numbers = SimpleNamespace(**self.network.numbers_of(member.section, self.numbers))
+            found.append(section.strain_energy(t, piece.strains, numbers))
         return found
 
     @cached_property

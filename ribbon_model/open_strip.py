@@ -143,13 +143,8 @@ class OpenStrip(Network):
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
         stroke = (STROKE,) if np.any(abs(along) > LOOSE) else ()
         roller = () if self.roller is None else ("roller",)
-        return (
-            *filter(None, self.numbers_at(LAST)),
-            *roller,
-            *stroke,
-            *forces,
-            *(name for name in LOADS if name not in FORCES),
-        )
+        others = (name for name in LOADS if name not in FORCES)
+        return *filter(None, self.numbers_at(LAST)), *roller, *stroke, *forces, *others
 
     @functools.cached_property
     def _usual(self) -> dict[str, float]:

@@ -82,10 +82,7 @@ def half_loop_branch(
 
 
 def _start(law: Law, m: int, n: int, parameters: float | Mapping[str, float], root: int) -> float:
-    """Return kappa_n of the circle where a branch begins.
-
-    Raises TwoBendings where the law has another bending for its moment.
-    """
+    """Return kappa_n of the circle where a branch begins; raise TwoBendings if the law has another bending for its moment."""
     kappa_n = thresholds(law, m, n, parameters)[root]
     moment: float = circle(law, m, kappa_n, parameters)["M1"]
     bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(parameters).values())[0][0, 0]

@@ -302,10 +302,7 @@ class Strip(Chain):
         return first @ turn, x
 
     def shape(self, places: int = 401) -> Shape:
-        """Return the strip in space at ``places`` equally spaced S; eta is interpolated between the middles of the segments.
-
-        Rods have no generators: eta is 0.
-        """
+        """Return the strip in space at ``places`` equally spaced S, with eta (0 for rods) interpolated between segments."""
         stations = np.linspace(0, LENGTH, places)
         axes, x = self.along(stations)
         eta = np.zeros(places)
@@ -338,10 +335,7 @@ def moved(chain: C, change, missed: Callable[[C], np.ndarray], slopes: Callable[
 
 
 def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
-    """Return the strip that has the strains of an equilibrium in the middle of each segment, closed.
-
-    Raises ValueError where it cannot be closed: too few segments.
-    """
+    """Return the closed strip with the strains of an equilibrium amid its segments; raise ValueError if these are too few."""
     directors = equilibrium.directors((np.arange(segments) + 0.5) * (LENGTH / segments))
     edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)
     moment = equilibrium.moment - np.cross(edges - directors[:, 2] * (LENGTH / segments / 2), equilibrium.force)

@@ -237,10 +237,7 @@ class Statement:
 
     @functools.cached_property
     def problem(self) -> contin.SegmentedVariationalProblem:
-        """The variational problem; its segments are the members, in their order.
-
-        Raises ProblemError for conditions that repeat or contradict each other.
-        """
+        """The variational problem, each member a segment; ProblemError for conditions that repeat or contradict others."""
         densities: dict[tuple, Callable] = {}
         segments, work, part = [], None, self._part
 
@@ -463,10 +460,7 @@ class Statement:
 
     @functools.cached_property
     def _end_energy(self) -> Callable | None:
-        """Return the potential of dead forces and moments at joints, as a function of (a, b, p); None without one.
-
-        And that of a pressure at ends that slide.
-        """
+        """Return the potential of dead loads at joints and of a pressure at ends that slide, of (a, b, p); None without one."""
         if not self.loads and not self._outline[1]:
             return None
         slides = [
@@ -478,9 +472,8 @@ class Statement:
             for name, direction, arm in load.forces:
                 first = self.joints[name].members[0]
                 on_directors = numbers_of(np.array(first.arm) + self.drawn_axes(first) @ np.array(arm, dtype=float))
-                forces.append(
-                    (number, self._reader(replace(self.joints[name], members=[replace(first, arm=on_directors)])), direction)
-                )
+                there = replace(self.joints[name], members=[replace(first, arm=on_directors)])
+                forces.append((number, self._reader(there), direction))
         turns = [
             (number, factor, self._reader(self.joints[name]), ends.angle_of(end), self.prescriptions[name][0])
             for number, load in self.loads.items() for name, factor in load.moments for end in (self.held[name],)
@@ -563,9 +556,8 @@ class Statement:
         own = set(self._of_sections)
         found = {name: 1.0 for name in self.parameters if name not in own} | {"sigma": max(force, moment)}
         found |= dict.fromkeys([name for joint in self.held for name in self.numbers_at(joint)[:3] if name], length)
-        found |= dict.fromkeys(self.loads, force) | dict.fromkeys(
-            [name for name in (*POTENTIALS, FOLLOWER) if name in found], force / length
-        )
+        found |= dict.fromkeys(self.loads, force)
+        found |= dict.fromkeys([name for name in (*POTENTIALS, FOLLOWER) if name in found], force / length)
         if "foundation" in found:
             found["foundation"] = force / length**2
         for number in range(len(self.members)):
