@@ -147,12 +147,6 @@ def smallest(a: Scalar, b: Scalar) -> Any:
     return select(b < a, b, a)
 
 
-def clip(a: Scalar, low: Scalar | None = None, high: Scalar | None = None) -> Any:
-    """Return a number within bounds."""
-    a = a if low is None else largest(a, low)
-    return a if high is None else smallest(a, high)
-
-
 def _parts(name: str) -> Callable[[object], Any]:
     """Return the function that takes a part of every number, or its conjugate."""
     return lambda values: elementwise(lambda value: part(value, name), values)
@@ -181,7 +175,8 @@ UFUNCS |= {
     "logical_or": lambda a, b: select(a, 1.0, select(b, 1.0, 0.0)),
     "bitwise_and": operator.and_, "bitwise_or": operator.or_, "invert": operator.invert,
     "conjugate": lambda a: part(a, "conjugate"),
-    "heaviside": lambda a, b: select(a < 0, 0.0, select(a == 0, b, 1.0)), "clip": lambda a, low, high: clip(a, low, high),
+    "heaviside": lambda a, b: select(a < 0, 0.0, select(a == 0, b, 1.0)),
+    "clip": lambda a, low, high: smallest(largest(a, low), high),
     "deg2rad": _scaled(math.pi / 180), "radians": _scaled(math.pi / 180),
     "rad2deg": _scaled(180 / math.pi), "degrees": _scaled(180 / math.pi),
     "isfinite": lambda a: abs(a) < math.inf, "isnan": lambda a: a != a,
@@ -416,7 +411,8 @@ def tabulated(table: Table) -> Callable[[object], Any]:
 
 def _clip(a: object, a_min: object = None, a_max: object = None, **options: Any) -> Any:
     low, high = options.get("min", a_min), options.get("max", a_max)
-    return elementwise(lambda value: clip(value, low, high), a)
+    a = a if low is None else elementwise(largest, a, low)
+    return a if high is None else elementwise(smallest, a, high)
 
 
 def _cross(a: object, b: object) -> Any:
