@@ -32,10 +32,13 @@ from contin.functions.stand_ins import RecordedFunction, prepared
 from contin.functions.tape import Tape, Unrecordable
 from contin.levels import LOCATED
 
-#: Largest number of paths through the decisions of one function, and of decisions on a path. A path doubles the operations at
-#: most; with ten times as many, a function of 100 operations could become one of 64,000. Decisions that are joined one by one
-#: are compared with a quarter as many random paths.
+#: Largest number of paths through the decisions of one function. A path doubles the operations at most; with ten times as many,
+#: a function of 100 operations could become one of 64,000. Decisions that are joined one by one are compared with a quarter as
+#: many random paths. They are from seven on: 2 ** 6 = 64.
 _PATHS = 64
+#: Largest number of decisions on a path: a grid of 300 buses has 136. A loop that ends by a comparison is told after as many;
+#: ten times more take ten times as long.
+_DECISIONS = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +115,15 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
     """
     paths, before = _Paths(tape, functools.partial(call, prepared(function)), tape.searches), tape.decide
     try:
+        first = paths.taken([], {})
+        ways = [functools.partial(paths.explored, [], path=first), functools.partial(paths.one_by_one, first)]
+        if 2 ** len(first.taken) > _PATHS:
+            ways.reverse()
         try:
-            values = paths.explored([])
+            values = ways[0]()
         except _ManyPaths:
-            values = paths.one_by_one()
+            paths.calls = 0
+            values = ways[1]()
         if values:
             return values
         raise Unrecordable("it has no value on any path")
@@ -151,31 +159,31 @@ class _Paths:
                 known[condition] = before[place][1] if place < len(before) else outcomes.get(condition, True)
                 taken.append((condition, known[condition]))
                 whole[condition] = _whole_numbers()
-                if len(taken) > _PATHS:
+                if len(taken) > _DECISIONS:
                     raise Unrecordable("it has a loop that ends by a comparison")
             return known[condition]
 
         self.tape.decide, self.tape.searches = decide, self.searches
         return _Path(_places(self.tape, self.call), taken, whole)
 
-    def explored(self, before: list[tuple[int, bool]], apart: Collection[int] = ()) -> list[int]:
+    def explored(self, before: list[tuple[int, bool]], apart: Collection[int] = (), path: _Path | None = None) -> list[int]:
         """Return the places of the values, joined over all outcomes of further decisions but for some conditions."""
         self.calls += 1
         if self.calls > _PATHS:
             raise _ManyPaths
-        values, taken, _ = self.taken(before, {})
+        values, taken, _ = path or self.taken(before, {})
         for place in range(len(taken) - 1, len(before) - 1, -1):
             condition = taken[place][0]
             if condition not in apart:
                 values = _joined(self.tape, condition, values, self.explored([*taken[:place], (condition, False)], apart))
         return values
 
-    def one_by_one(self) -> list[int]:
+    def one_by_one(self, first: _Path) -> list[int]:
         """Return the places of the values with selections where the other outcome of one decision makes a difference.
 
         They are compared with paths of random outcomes. Raises _ManyPaths where decisions are not independent.
         """
-        first, others, done = self.taken([], {}), dict[int, list[int]](), dict[Any, int]()
+        others, done = dict[int, list[int]](), dict[Any, int]()
         conditions = [condition for condition, _ in first.taken]
         for place, condition in enumerate(conditions):
             self.calls = 0

@@ -281,6 +281,13 @@ def test_independent_guards_are_joined_one_by_one(name):
     assert np.abs(found - slope).max() <= 1e-8 * np.abs(slope).max()
 
 
+def test_a_hundred_independent_decisions():
+    batch = Batch([lambda u, p: [_guard(x) for x in u]], [100], [f"x{k}" for k in range(100)], [], times=False)
+    u = np.where(np.arange(100) % 3, np.arange(100) / 7, 0.0)
+    assert batch.values(np.zeros(1), u[None], np.empty((0, 100)), np.empty(0))[0] == pytest.approx([*map(_guard, u)], 1e-14)
+    assert batch.interpreted is None
+
+
 def _counted(u, p):
     count = 0
     for x in u:
