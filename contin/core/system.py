@@ -26,7 +26,7 @@ from contin.core.protocol import Carrier, Discretization
 from contin.draws import ASIDE
 from contin.errors import ProblemError
 from contin.functions.batch import Batch, Columns
-from contin.functions.origin import source
+from contin.functions.origin import condition
 from contin.levels import LAST_PLACES
 from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
@@ -481,7 +481,7 @@ class Composed(System):
         own = [number for number, (other, _) in enumerate(self._decided) if other == name]
         if contact := getattr(self.problem, "contacts", {}).get(at) if batch.signature.ends else None:
             return f"{contact} {'touches' if side > 0 else 'lifts off'}"
-        if known := source(batch, at):
+        if known := condition(batch, at, [self._decided[number][1] for number in own]):
             return known
         labels = [f"{end}.{state}" for end in "ab" for state in states] if batch.signature.ends else states
         numbers = batch.frozen(self._free, np.ones(len(own)), name == "field")[1]

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contin import errors as checks
 from contin.functions.batch import Batch
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recording import record
-from contin.functions.tape import Number, Operation, Tape, Unrecordable
+from contin.functions.tape import Frame, Number, Operation, Tape, Unrecordable
 from contin.text import COLUMNS
 
 #: Folders of code that is not the user's.
@@ -138,8 +139,23 @@ class _Stopping(Tape):
         return place
 
 
+def condition(batch: Batch, place: int, others: Sequence[int]) -> str:
+    """Return what the user has written for a condition, and where it is one of ``others``, as in a loop, its equations."""
+    found = source(batch, place)
+    if not (batch.recorded and found) or [source(batch, other) for other in {*others}].count(found) < 2:
+        return found
+    recording, names = batch.recorded.recording, batch.signature.states
+    reads = recording.tape.reading(recording.results, [place])
+    rows = [row for row, result in enumerate(recording.results) if reads[result]]
+    alike = len(recording.results) == len(names)
+    return f"{found}, equation {checks.listed(f'{row + 1}' + f' ({names[row]})' * alike for row in rows)}"
+
+
 def source(batch: Batch, place: int) -> str:
     """Return what the user has written for an operation, with its line; "" where that is not known."""
+    assert batch.recorded is not None
+    if stack := batch.recorded.recording.tape.stacks.get(place):
+        return _line(stack)
     try:
         record(batch.functions, batch.signature, _Stopping(place))
     except (_Reached, Unrecordable) as error:
@@ -149,17 +165,25 @@ def source(batch: Batch, place: int) -> str:
 
 def _written(error: BaseException) -> str:
     """Return what the user has written where an error is raised, with its line; "" where that is not known."""
-    trace, text = error.__traceback__, ""
+    trace, stack = error.__traceback__, list[Frame]()
     while trace is not None:
-        code = trace.tb_frame.f_code
-        if not code.co_filename.startswith((*_LIBRARIES, "<__array_function__")):
-            line, end, first, last = list(code.co_positions())[trace.tb_lasti // 2]
-            written = linecache.getline(code.co_filename, trace.tb_lineno).strip()
-            if line == end and first is not None and written:
-                written = linecache.getline(code.co_filename, trace.tb_lineno).encode()[first:last].decode()
-            text = f"{written}, ".lstrip(", ") + f"line {trace.tb_lineno} of {Path(code.co_filename).name}"
+        stack.insert(0, (trace.tb_frame.f_code, trace.tb_lasti, trace.tb_lineno))
         trace = trace.tb_next
-    return text
+    return _line(stack)
+
+
+def _line(stack: Sequence[Frame]) -> str:
+    """Return what is written in the innermost frame that is the user's, with its line; "" where there is none."""
+    for code, instruction, number in stack:
+        if code.co_filename == record.__code__.co_filename:
+            break
+        if not code.co_filename.startswith((*_LIBRARIES, "<__array_function__")):
+            line, end, first, last = list(code.co_positions())[instruction // 2]
+            written = linecache.getline(code.co_filename, number).strip()
+            if line == end and first is not None and written:
+                written = linecache.getline(code.co_filename, number).encode()[first:last].decode()
+            return f"{written}, ".lstrip(", ") + f"line {number} of {Path(code.co_filename).name}"
+    return ""
 
 
 def _named(place: Place) -> str:

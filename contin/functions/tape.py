@@ -16,9 +16,12 @@ from __future__ import annotations
 
 import math
 import numbers
+import sys
+import traceback
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import CodeType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +32,12 @@ from contin.functions import primitives
 
 class Unrecordable(BaseException):
     """A function needs what recorded numbers lack, such as a value; no ``Exception``: a user's function must not catch it."""
+
+
+#: The code of a frame, and the instruction and the line that it has reached.
+Frame = tuple[CodeType, int, int]
+#: Operations that a number's sign decides.
+DECIDED = ("lt", "le", "abs", "sign", "table")
 
 
 class Operation(NamedTuple):
@@ -47,6 +56,7 @@ class Tape:
       ``arrays.function(...)``.
     - ``decide`` (callable, optional): ``decide(condition)`` returns the outcome that the present recording assumes where a
       function asks for the truth of a number. Without it such a question raises `Unrecordable`.
+    - ``stacks`` (dict of list of Frame): Where a recorded function decides by an operation, by its place; inner frames first.
 
     Examples
     --------
@@ -62,6 +72,7 @@ class Tape:
         self.arrays = arrays
         self.decide: Callable[[int], bool] | None = None
         self.searches = 0  # in the present recording: names their unknowns
+        self.stacks: dict[int, list[Frame]] = {}
         self._known: dict[Hashable, int] = {}
         self._results: dict[Hashable, Any] = {}
 
@@ -131,6 +142,9 @@ class Tape:
         if known is None:
             known = self._known[key] = len(self.operations)
             self.operations.append(operation)
+            if self.decide is not None and operation.name in DECIDED:
+                frames = traceback.walk_stack(sys._getframe(1))
+                self.stacks[known] = [(frame.f_code, frame.f_lasti, line) for frame, line in frames]
         return known
 
     def reading(self, places: Iterable[int], sources: Iterable[int]) -> list[bool]:

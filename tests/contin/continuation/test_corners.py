@@ -2,10 +2,11 @@
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import contin
@@ -33,6 +34,78 @@ def test_a_branch_turns_or_goes_on_at_a_corner():
     branch = followed(lambda u, p: (u.x + max(0, u.x - 1) - p.a,), ["x"], 0.5, [0.5], -1, 4)
     assert corners(branch) == [(1, "goes on")] and branch.points[-1].x == pytest.approx([2.5, 4])
     assert branch.labelled("BC")[0].details.ways[0] == pytest.approx(np.array([1, 2]) / np.sqrt(5))
+
+
+# A ring of nine buses, with generators at 1, 2 and 3 and loads at 5, 6 and 8.
+LINES = {
+    (1, 4): 0.06j, (2, 7): 0.06j, (3, 9): 0.06j, (4, 5): 0.01 + 0.09j, (5, 7): 0.03 + 0.16j, (7, 8): 0.01 + 0.07j,
+    (8, 9): 0.01 + 0.1j, (9, 6): 0.04 + 0.17j, (6, 4): 0.02 + 0.09j,
+}  # fmt: skip
+ADMITTANCE = np.zeros((9, 9), complex)
+for (one, two), impedance in LINES.items():
+    ADMITTANCE[[one - 1, two - 1], [one - 1, two - 1]] += 1 / impedance + 0.1j * (impedance.real > 0)
+    ADMITTANCE[[one - 1, two - 1], [two - 1, one - 1]] -= 1 / impedance
+SPENT = np.array([0, -1.6, -0.9, 0, 1.2 + 0.5j, 0.9 + 0.3j, 0, 1.0 + 0.4j, 0])
+
+
+def powers(angles, volts, more):
+    """Return what each bus gives to the grid and its load, at loads 1 + more times those above."""
+    E = np.concatenate([[1.0], volts]) * np.exp(1j * np.concatenate([[0.0], angles]))
+    return E * np.conj(ADMITTANCE @ E) + (1 + more) * SPENT
+
+
+def clipped(u, p, most):
+    S = powers(u[:8], u[8:], p.a)
+    return np.concatenate([S.real[1:], np.clip(S.imag[1:3] + 1 - u[8:10], [-1, -1], most) - S.imag[1:3], S.imag[3:]])
+
+
+def decided(u, p, most):
+    def reactive(voltage, power, limit):
+        if 1 - voltage > limit - power:
+            return power - limit
+        return voltage - 1
+
+    S = powers(u[:8], u[8:], p.a)
+    return [*S.real[1:], *(reactive(u[8 + k], S.imag[1 + k], most[k]) for k in (0, 1)), *S.imag[3:]]
+
+
+def rectangular(u, p, most):
+    re, im = np.concatenate([[1.0], u[:8]]), np.concatenate([[0.0], u[8:]])
+    e, f = ADMITTANCE.real @ re - ADMITTANCE.imag @ im, ADMITTANCE.real @ im + ADMITTANCE.imag @ re
+    active, q = re * e + im * f + (1 + p.a) * SPENT.real, im * e - re * f + (1 + p.a) * SPENT.imag
+    return [*active[1:], *(min(1 - re[k] ** 2 - im[k] ** 2, most[k - 1] - q[k]) for k in (1, 2)), *q[3:]]
+
+
+def by_active_sets(most):
+    """Return corners and the turning point: for each set of generators at their limits, smooth equations by SciPy."""
+
+    def found(at_limit, k, voltage=1.0):
+        def rows(z):
+            S = powers(z[:8], z[8:16], z[16])
+            limits = [S.imag[1 + j] - most[j] if j in at_limit else z[8 + j] - 1 for j in (0, 1)]
+            return [*S.real[1:], *limits, *S.imag[3:], z[8 + k] - voltage]
+
+        return root(rows, [0.0] * 8 + [1.0] * 8 + [0.3], tol=1e-14).x[16]
+
+    first = min((0, 1), key=lambda k: found({k}, k))
+    last, every = 1 - first, {0, 1}
+    second = found(every, last)
+    if found(every, last, 1 - 1e-3) < second:
+        return [(found({first}, first), "goes on"), (second, "fold")]
+    top = minimize_scalar(lambda v: -found(every, last, v), bounds=(0.8, 1.0), method="bounded", options={"xatol": 1e-7})
+    return [(found({first}, first), "goes on"), (second, "goes on"), (-top.fun, "LP")]
+
+
+@pytest.mark.parametrize(("residual", "most"), [(clipped, (1.0, 1.0)), (decided, (1.4, 0.6)), (rectangular, (0.9, 0.7))])
+def test_a_grid_whose_generators_reach_their_limits(residual, most):
+    names = [f"{kind}{bus}" for kind in "aV" for bus in range(2, 10)]
+    flat = [1.0] * 8 + [0.0] * 8 if residual is rectangular else [0.0] * 8 + [1.0] * 8
+    branch = followed(lambda u, p: residual(u, p, most), names, 0.0, flat, 0, 5)
+    met = [(point["a"], getattr(point.details, "kind", "LP")) for point in branch if point.label in ("BC", "LP")]
+    expected = by_active_sets(most)
+    assert [kind for _, kind in met] == [kind for _, kind in expected] and branch[-1]["a"] == 0
+    assert np.abs(np.subtract([a for a, _ in met], [a for a, _ in expected])).max() < 1e-10
+    assert all(re.search(r", line \d+ of test_corners.py, equation (9|10) ", point.name) for point in branch.labelled("BC"))
 
 
 def test_a_branch_ends_where_the_equations_jump_or_have_no_slope():
