@@ -6,7 +6,8 @@ that are zero, or nothing but errors, follow from the exact Taylor expansion of 
 1. The tangent t of the branch, and its derivatives with respect to the primary parameter p. The smallest change of p at which a
    term of higher order is as large as the linear one bounds the size of p.
 2. The distance to the nearest singular point, where F_x is singular: 1 / |mu|, for the eigenvalue mu of largest modulus of
-   -F_x^-1 F_xx[t, .], by power iteration. It bounds the size of p too: on a trivial branch, nothing else does.
+   -F_x^-1 F_xx[t, .], by power iteration. It bounds the size of p too: on a trivial branch, nothing else does. Far beyond the
+   change of 1 it says nothing, as F_x no longer changes with the first power of p (a diode at -1 V).
 3. The eigenvector v of mu leads to the branch that leaves there. The amplitude at which a nonlinear term along v is as large as
    the linear one is the size of the states that take part in v.
 
@@ -175,7 +176,8 @@ class _FirstPoint:
             return known  # differences are taken over lengths of order one: they show no other sizes
         at = np.arange(known.size) == self.at
         terms = [self.system.largest(term) for term in self._terms()]
-        modes = list(self._modes(known))
+        far = _reach(terms) / ROUGH
+        modes = [mode for mode in self._modes(known) if mode.distance <= far]
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
         small = (known > 0) & (known < USUAL[0]) & ~at
         bends = np.where(at | (small & ~(known > DOUBLED * self._alone(small))), 0.0, known)

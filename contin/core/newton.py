@@ -23,7 +23,7 @@ from contin.errors import ConvergenceError, Within
 from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.convergence import CHORD, CHORDS, CONVERGED, DIVERGES, STAGNATES, judge_update, subtract
+from contin.linalg.convergence import CHORD, CHORDS, CONVERGED, DIVERGES, FAR, FRESH, STAGNATES, judge_update, subtract
 from contin.text import shown
 
 #: Part of an update that must change the next one by half of that part at least. Ten times larger, strongly nonlinear equations
@@ -203,6 +203,10 @@ def _newton(
             updates += [size] if math.isfinite(size) else []
             if said == DIVERGES:
                 break
+            if said == CONVERGED and fresh and size > newton.tolerance:  # as far as the updates before have said
+                residual = system.residual(x)
+                update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+                said = said if subtract(x.copy(), update) <= max(newton.tolerance, FAR * size) else FRESH
             if said == CONVERGED or (said == STAGNATES and _is_noise(system, x, update, rows, LOCATED)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(error / (size or 1.0), min(1.0, relative)) <= newton.tolerance:

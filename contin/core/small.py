@@ -19,7 +19,7 @@ from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg import convergence
-from contin.linalg.convergence import judge_update, subtract
+from contin.linalg.convergence import FAR, judge_update, subtract
 from contin.linalg.small import factor_small, solve_small
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
@@ -54,7 +54,7 @@ class Equations(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """The matrix [F_x; row], its factors, an update, and ``found``: sign of the determinant, updates, error that is left."""
+    """The matrix [F_x; row], its factors, an update, and ``found``: sign of the determinant, updates, error left, last one."""
 
     matrix: Matrix
     lu: Matrix
@@ -65,7 +65,7 @@ class Linear(NamedTuple):
 
 
 #: Places in ``Linear.found``.
-SIGN, UPDATES, ERROR = range(3)
+SIGN, UPDATES, ERROR, SIZE = range(4)
 
 
 def equations_of(system: Any) -> Equations | None:
@@ -87,7 +87,7 @@ def equations_of(system: Any) -> Equations | None:
 def linear_of(size: int) -> Linear:
     """Return the room for a matrix of this size."""
     (matrix, lu), (row, update) = np.empty((2, size, size)), np.empty((2, size))
-    return Linear(matrix, lu, np.empty(size, dtype=np.int64), row, update, np.empty(ERROR + 1))
+    return Linear(matrix, lu, np.empty(size, dtype=np.int64), row, update, np.empty(SIZE + 1))
 
 
 @functools.lru_cache(maxsize=16)
@@ -120,7 +120,7 @@ def corrected_small(system: Any, guess: Array, row: Array, target: float | Array
     linear.row[:] = row
     if correct_point(*rooms, newton.tolerance, newton.max_iterations, x, float(target), tangent) != BELIEVED:
         return None
-    sign, iterations, error = linear.found.tolist()
+    sign, iterations, error, _ = linear.found.tolist()
     return Found(x, tangent, linear.matrix.copy(), sign, int(iterations), error)
 
 
@@ -181,25 +181,31 @@ def linearize(equations: Equations, linear: Linear, x: Array) -> float:
 
 
 @helper
+def _fill_update(equations: Equations, linear: Linear, x: Array, target: float) -> None:
+    """Fill in the update at x, where the functions have been evaluated."""
+    fill_residual(equations, linear.update)
+    missing = -target
+    for i in range(x.size):
+        missing += linear.row[i] * x[i]
+    linear.update[x.size - 1] = missing
+    solve_small(linear.lu, linear.exchanges, linear.update)
+
+
+@helper
 def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float) -> int:
     """Solve F(x) = 0 and row.x = target by Newton's method and chord steps, in place."""
-    size, fresh, moved, before, now = x.size, True, 1.0, math.inf, math.inf
+    fresh, moved, before, now = True, 1.0, math.inf, math.inf
     for number in range(1, most + 1):
         now = math.inf
         if not fresh:
             evaluate_values(equations, x)
         elif linearize(equations, linear, x) == 0.0:
             break
-        fill_residual(equations, linear.update)
-        missing = -target
-        for i in range(size):
-            missing += linear.row[i] * x[i]
-        linear.update[size - 1] = missing
-        solve_small(linear.lu, linear.exchanges, linear.update)
+        _fill_update(equations, linear, x, target)
         now = subtract(x, linear.update)
         said, error, moved = judge_update(now, before, moved, number, fresh, tolerance)
         if said == convergence.CONVERGED:
-            linear.found[UPDATES], linear.found[ERROR] = number, error
+            linear.found[UPDATES], linear.found[ERROR], linear.found[SIZE] = number, error, now
             return BELIEVED
         if said == convergence.STAGNATES:
             return ASKS
@@ -233,12 +239,14 @@ def correct_point(
     if outcome != BELIEVED:
         return outcome
     sign = linearize(equations, linear, x)
-    fill_residual(equations, linear.update)
-    total = 0.0
-    for i in range(x.size - 1):
-        total += abs(linear.update[i])
-    if sign == 0.0 or not total < math.inf:
+    _fill_update(equations, linear, x, target)
+    following = 0.0
+    for i in range(x.size):
+        following += abs(linear.update[i]) / (1 + abs(x[i]))
+    if sign == 0.0 or not following < math.inf:
         return FAILED
+    if following > tolerance and following > FAR * linear.found[SIZE]:
+        return ASKS  # updates do not shrink, whatever those before have said
     linear.found[SIGN] = sign
     _fill_tangent(equations, linear, tangent)
     return BELIEVED

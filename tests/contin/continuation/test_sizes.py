@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipk, jn_zeros
 
 import contin
@@ -336,3 +337,23 @@ def test_round_off_of_sums_that_cancel_is_no_size():
         start = solve(arch, lambda t, e=e: (e * math.sin(t), e * math.cos(t), 0), parameters={"e": e})
         point = trace(start, free=["q"], limits={"q": (-7, 14)}, max_points=2)[-1]
         assert point.system.scales.are_one
+
+
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("resistance", [1e-3, 1.0, 1e3, 1e6])
+def test_diodes_in_series_with_a_resistor(count, resistance):
+    """At V = -1 the current is 1e-14 and its exponential a line; i R + count 0.025 log(1 + i / 1e-14) = V by brentq."""
+
+    def residual(u, p):
+        drops = [*u[1:], p.V - sum(u[1:]) - u[0] * resistance]
+        return [u[0] - 1e-14 * (math.exp(drop / 0.025) - 1) for drop in drops]
+
+    diodes = contin.AlgebraicProblem(residual, ["i", "v"][:count], {"V": -1.0})
+    branch = contin.trace(contin.solve(diodes, [0.0] * count), free=["V"], limits={"V": (-1, 2)})
+    assert not branch.notes and [point.label for point in branch if point.label] == ["EP", "EP"] and len(branch) < 80
+    for point in branch:
+        if point["V"] > 0.1:
+            volts = lambda i: i * resistance + count * 0.025 * math.log1p(i / 1e-14) - point["V"]  # noqa: B023, E731
+            exact = brentq(volts, 0, 2 / resistance, xtol=1e-300, rtol=1e-15)
+            assert abs(point["i"] - exact) < 5e-12 * (1 + exact / 0.025)  # the tolerance is 1e-12 (1 + V) of V, too
+    assert branch[-1]["i"] == pytest.approx(exact, rel=1e-12, abs=1e-12)
