@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from contin.arrays import Array
 from contin.continuation.points import Notes
 from contin.continuation.rules import aims, judged, predict
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.step import Reason, State, Stop, corrected
-from contin.core.system import Scales
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.corner import changed_between
-from contin.levels import CORRECTED, MOST_STEPS, ROUGH
+from contin.levels import CORRECTED, DOUBLED, MOST_STEPS, ROUGH
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -168,10 +168,14 @@ def _next(state: State, step: float, settings: Settings) -> Trial | None:
     return trial if finite and judged(state, guess, trial).turn <= aims(settings, state.system)[0] else None
 
 
-def runs_away(now: Scales, then: Scales) -> bool:
-    """Return whether sizes are so much larger than at the start that the numbers there are round-off."""
+def runs_away(system: Discretization, x: Array, start: Discretization, begun: Array) -> bool:
+    """Return whether sizes are so much larger than at the start that the numbers there are round-off.
+
+    Unknowns whose sizes do not grow, as of maps, leave of others that tend to zero what is round-off then: their inverse.
+    """
+    now, then = system.solution.scales, start.solution.scales
     if now is then:
-        return False
+        return not system.on_curve and bool(np.abs(x).max() * DOUBLED > max(1.0, np.abs(begun).max()))
     return bool(np.append(now.states / then.states, now.parameters / then.parameters).max() > _FAR)
 
 
@@ -183,12 +187,14 @@ def _nears(trial: Trial, state: State, limits: Sequence[float], primary: str) ->
     return abs(gone) > CORRECTED * abs(value) and (limits[int(gone > 0)] * value > 0 or abs(value) > ROUGH * size)
 
 
-def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: Discretization) -> Stop | None:
+def ended(
+    trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: tuple[Discretization, Array]
+) -> Stop | None:
     """Return why a run ends after a step: it has as many points as it may have, goes to infinity, or stands still."""
     if state.accepted >= settings.max_points:
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
     limits = settings.limits.get(primary)
-    far = runs_away(trial.system.solution.scales, start.solution.scales)
+    far = runs_away(trial.system, trial.x, *start)
     if far and not (limits and _nears(trial, state, limits, primary)):
         names = (*(name for name in trial.system.free), "the largest state")
         sizes = (*(trial[name] for name in trial.system.free), np.abs(trial.system.states(trial.x)).max(initial=0.0))

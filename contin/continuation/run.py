@@ -166,7 +166,7 @@ class Continuation:
         while True:
             due, state = self._adapt(), self.state
             lane = None if state.singular else self._lanes.of(state.system, self.settings, self._notes.is_noisy)
-            if lane is None or runs_away(state.system.scales, self.start[0].scales):
+            if lane is None or runs_away(state.system, state.x, *self.start[:2]):
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self.here())
@@ -255,7 +255,7 @@ class Continuation:
             self.go_on(self._meshes.moved(self.state, self.here, (other, self.state.system.carrier(other))))
         self._notes.corners(step.end)
         self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
-        self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[0])
+        self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[:2])
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
@@ -294,7 +294,7 @@ class Continuation:
             if any(np.abs(left - known).max() < APART for _, known in self._left if known.size == left.size):
                 self.stop = Stop(Reason.KNOWN_BRANCH, "the run comes back to a corner, and the way on is known")
             elif accepted >= settings.max_points:
-                self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[0])
+                self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[:2])
             self._left.append((length, left))
 
     def _index_across(self, corner: SpecialPoint, ways: list[Way]) -> IndexChange | None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from contin import AlgebraicProblem, diagram, solve, trace
+from contin import AlgebraicProblem, MapProblem, diagram, solve, trace
 
 BRANCHES = {"pole": lambda u, p: (u.x * p.a - 1,), "line": lambda u, p: (u.x - p.a,), "parabola": lambda u, p: (u.x**2 - p.a,)}
 
@@ -27,3 +27,10 @@ def test_limits_that_are_not_reached_end_no_run():
     chemostat = AlgebraicProblem(lambda u, p: (u.S / (1 + u.S) - p.D,), ["S"], {"D": 0.5})
     washed = trace(solve(chemostat, [1.0]), free=["D"], limits={"D": (0.2, 2)})
     assert washed.stop.reason == "infinity" and len(washed) < 100 and abs(washed[-1]["D"] - 1) < 1e-12
+
+
+def test_a_fixed_point_of_a_map_that_goes_to_infinity():
+    """x = 1 - 1/r again, of the logistic map: its unknowns have no sizes."""
+    logistic = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0})
+    branch = trace(solve(logistic, [0.5]), free=["r"], limits={"r": (-5, 5)}, direction=-1)
+    assert branch.stop.reason == "infinity" and len(branch) < 100 and abs(branch[-1]["r"] * (1 - branch[-1]["x"]) - 1) < 1e-4
