@@ -274,7 +274,7 @@ class Continuation:
         yield self._point(failure, self.state, accuracy=self._accuracy)
 
     def _turn(self, point: SpecialPoint, arc: Arc) -> Iterator[Point]:
-        """Yield a corner, and go on behind it."""
+        """Go on behind a corner, and yield it: a run that is resumed there does not come to it again."""
         assert point.test is not None
         state, settings, came = arc.state, self.settings, point.trial.tangent
         came = came if np.isfinite(came).all() else state.tangent
@@ -282,9 +282,8 @@ class Continuation:
         corner, ways = corner_at(point, came, hit, self.primary)
         shown = settings.corners or hit not in state.system.knots
         corner = corner if corner and (shown or corner.details.kind != "goes on") else None
-        if corner is not None:
-            self.stop = None if ways else Stop(Reason.EVENT, f"met a corner, {corner.name}", event=corner.name)
-            yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
+        if corner is not None and not ways:
+            self.stop = Stop(Reason.EVENT, f"met a corner, {corner.name}", event=corner.name)
         if ways:
             at, accepted = corner or point, state.accepted + (corner is not None)
             behind = on_branch(*on_mesh_of(state.system, ways[0], at.trial.x, hit), settings, False)
@@ -296,6 +295,8 @@ class Continuation:
             elif accepted >= settings.max_points:
                 self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[:2])
             self._left.append((length, left))
+        if corner is not None:
+            yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
 
     def _index_across(self, corner: SpecialPoint, ways: list[Way]) -> IndexChange | None:
         """Return the index before and behind a corner: what contacts hold does not move."""

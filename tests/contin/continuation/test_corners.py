@@ -10,7 +10,8 @@ from scipy.optimize import brentq, minimize_scalar, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import contin
-from contin import AlgebraicProblem, BoundaryValueProblem, Segment, SegmentedProblem, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, Segment, SegmentedProblem, Settings, solve, trace
+from contin.lowlevel import Continuation
 
 
 def corners(branch):
@@ -106,6 +107,15 @@ def test_a_grid_whose_generators_reach_their_limits(residual, most):
     assert [kind for _, kind in met] == [kind for _, kind in expected] and branch[-1]["a"] == 0
     assert np.abs(np.subtract([a for a, _ in met], [a for a, _ in expected])).max() < 1e-10
     assert all(re.search(r", line \d+ of test_corners.py, equation (9|10) ", point.name) for point in branch.labelled("BC"))
+
+
+def test_a_run_that_is_resumed_behind_a_corner_does_not_come_to_it_again():
+    start = solve(AlgebraicProblem(lambda u, p: (abs(u.x) - p.a,), ["x"], {"a": 1.0}, dynamics=False), [1.0])
+    (system, x), settings = start.system.with_free(["a"], start.x), Settings(direction=-1, limits={"a": (-1, 2)})
+    run = Continuation(system, x, settings)
+    points = list(itertools.takewhile(lambda point: point.label != "BC", run))
+    rest = list(Continuation(system, x, settings, state=run.state, start=run.start))
+    assert points[-1]["x"] > 0 > rest[0]["x"] and [point.label for point in rest if point.label] == ["EP"]
 
 
 def test_a_branch_ends_where_the_equations_jump_or_have_no_slope():
