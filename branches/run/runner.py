@@ -180,11 +180,10 @@ def _through(stage: Stage, run: Continuation, writer: BranchWriter, labelled: li
         labelled += [point] if point.label else []
         if run.stop is not stop:
             break  # the stage ends here, which its run does not know
-        if point.label and point.name != START:
-            continue  # inside a step: a run cannot be resumed from here
-        if run.state.system.scales.are_one:  # states with scales are not stored; such a stage begins again
+        regular = not point.label or point.name == START  # others lie inside a step, which a resumed run makes again
+        if regular and run.state.system.scales.are_one:  # states with scales are not stored; such a stage begins again
             writer.mark(run.state)
-        if interruption.asked or writer.due():
+        if run.stop is None and (interruption.asked or writer.due()):
             writer.note(stage.notes(run))
             writer.checkpoint(run.start, "interrupted" if interruption.asked else "running")
             interrupt.change(f"{writer.path} keeps the points of its last checkpoint; go on with --resume")

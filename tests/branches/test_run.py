@@ -260,6 +260,17 @@ def test_a_disk_that_is_read_only(call, scene, disk):
 # --- interrupted, and gone on with ------------------------------------------------------------------------------------
 
 
+def test_a_run_stopped_at_a_labelled_point_keeps_it(tmp_path, silent, undisturbed, tables):
+    """It lies inside a step, from whose beginning the run goes on."""
+    path, config = tmp_path / "x.h5", scene_of()
+    run_scene(config, path, silent())
+    number = int(np.flatnonzero(rows(path)["label"])[1])
+    stopped = silent({number: lambda: signal.raise_signal(signal.SIGINT)})
+    assert run_scene(config, path, stopped, overwrite=True) == "interrupted"
+    assert len(rows(path)) == number + 1 and rows(path)["label"][number]
+    assert run_scene(config, path, silent(), resume=True) == "complete" and tables(path) == undisturbed(config)
+
+
 @pytest.mark.full
 def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tables):
     """Ctrl-C after each point in turn, labelled ones too; the columns are in the end bit by bit those of one run."""
