@@ -186,7 +186,7 @@ def doubling(order: int = 1) -> Event:
 
 
 def _antiperiodic(trial: Trial) -> float:
-    values = trial.system.computed_eigenvalues(trial.x)
+    values = trial.settled.system.computed_eigenvalues(trial.settled.x)
     with np.errstate(invalid="ignore"):  # NaN where there are none
         size = np.exp(-np.abs(values.real))
         ahead = np.exp(1j * values.imag)
