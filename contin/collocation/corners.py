@@ -297,6 +297,10 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         places = narrowed(sides, a[rough], b[rough], which)
         ends = np.array([np.maximum(places - half, mesh[0]), np.minimum(places + half, mesh[-1])])
         inside = np.array([mesh[at], mesh[at + 1]])
+        for each in np.unique(which):  # a polynomial misses no more than what lies between two switches of one condition
+            (mine,) = np.nonzero(which == each)
+            inside[0, mine[1:]] = np.maximum(inside[0, mine[1:]], places[mine[:-1]])
+            inside[1, mine[:-1]] = np.minimum(inside[1, mine[:-1]], places[mine[1:]])
         gap = np.fmin(*[worst(places, end, which) for end in ends])
         missed = [worst(places, end, which) for end in inside]
         beside = [largest((places + (end - places) * _AT_ONCE)[:, None], places, which)[:, 0] for end in ends]
