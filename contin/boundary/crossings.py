@@ -199,13 +199,9 @@ def clearance(system: Any, x: Array) -> tuple[float, str]:
     h = there(t) * sides
     low = (h[1:-1] <= h[:-2]) & (h[1:-1] < h[2:]) & (sides[:-2] == sides[2:]) & (sides[1:-1] == sides[2:])
     for i, k in np.argwhere(low).tolist():
-        side, at, step = sides[i + 1], t[i + 1], t[i + 2] - t[i]
+        side = sides[i + 1]
         other = np.where(np.arange(side.size) == k, -side, side)
-        for _ in range(_PARABOLAS):
-            before, value, behind = side[k] * there(at + step * np.array([-1.0, 0.0, 1.0]))[:, k]
-            bend, slope = before - 2 * value + behind, before - behind
-            at, step = at + step * float(np.clip(slope / (2 * bend), -1, 1)) if bend > 0 else at, step / 10
-        times = np.array([at, t[i], t[i + 2]])
+        times = np.append(highest(there, t[i + 1 : i + 2], t[i + 2] - t[i], -side[k], k)[0], t[[i, i + 2]])
         (f, g), u = (batch.frozen(every, each)[0] for each in (side, other)), system.evaluate(x, times)
         gaps = np.abs(f.values(times, u, u[:0], p) - g.values(times, u, u[:0], p)).max(axis=1)
         numbers = side[k] * there(times)[:, k]
@@ -213,8 +209,29 @@ def clearance(system: Any, x: Array) -> tuple[float, str]:
         jumps = abs(gaps[0] - gaps[far] * abs(numbers[0] / numbers[far])) > ROUGH * gaps[far]
         if jumps and numbers[0] < best[0]:
             origin = batch.conditions(every)[k]
-            best = float(numbers[0]), f"{source(batch, origin)}, where the equations jump, changes its sign at t = {at:.6g}"
+            best = (
+                float(numbers[0]),
+                f"{source(batch, origin)}, where the equations jump, changes its sign at t = {times[0]:.6g}",
+            )
     return best
+
+
+def highest(there: Any, at: Array, step: Any, side: Any, k: Any) -> tuple[Array, Array]:
+    """Return times near ``at`` (m,) at which the numbers k, times their ``side``, have a maximum over t, and these maxima.
+
+    ``there(times)`` gives all numbers; a maximum is no further off than the ``step``.
+    """
+
+    def values(times: Array) -> Array:
+        return np.asarray(side * there(times)[np.arange(times.size), k])
+
+    for _ in range(_PARABOLAS):
+        before, value, behind = (values(at + part * step) for part in (-1.0, 0.0, 1.0))
+        bend, slope = before - 2 * value + behind, before - behind
+        with np.errstate(all="ignore"):
+            at = at + step * np.where(bend < 0, np.clip(slope / (2 * bend), -1, 1), 0.0)
+        step = step / 10
+    return at, values(at)
 
 
 def stepped(system: Any, x: Array, change: Array) -> tuple[Array, Array, Array]:

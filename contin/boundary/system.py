@@ -29,6 +29,7 @@ from contin.boundary.crossings import (
     outcomes,
     stepped,
 )
+from contin.boundary.grazing import grazing, touch_ahead
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
@@ -332,7 +333,7 @@ class Collocation(Composed):
         if self.outcomes.size and not self.contradicts(x):
             return self, x
         system = self.with_pieces(None)
-        if not system.switching(x).jumps.any() or not any(name == "field" for name, _ in self._selections):
+        if not system.switching(x).jumps.any() or not self._switches_inside:
             return system, x
         system, carry = system.on_switches(x) or (system, np.array)
         t, x = (system.mesh[1:] + system.mesh[:-1]) / 2, carry(x)
@@ -791,7 +792,21 @@ class Collocation(Composed):
 
     def events(self) -> list[Event]:
         """Return those of the statement and, where the equations jump, of crossings that end."""
-        return [*self.problem.events(), *(jumping() if self.outcomes.size else ())]
+        return [*self.problem.events(), *self._of_conditions()]
+
+    def home_ahead(self, state: State, step: float) -> SpecialPoint | None:
+        """Return the grazing point to which the tangent leads within a step."""
+        return touch_ahead(state, step) if self._switches_inside else None
+
+    @property
+    def _switches_inside(self) -> bool:
+        """Conditions along the solution decide the right-hand side."""
+        return any(name == "field" for name, _ in self._selections)
+
+    def _of_conditions(self) -> list[Event]:
+        """Return the test functions of conditions along the solution."""
+        touches = [grazing()] * self._switches_inside
+        return [*touches, *(jumping() if self.outcomes.size else ())]
 
     def stability(self, point: SpecialPoint) -> Stability:
         """Return what the statement says."""

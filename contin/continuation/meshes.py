@@ -216,8 +216,12 @@ class MeshPolicy:
             if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break
             other = finer(end.system, end.x, accuracy.error, control)
-            if other is not None and run.state.singular:  # its tangent is not corrected; the end has moved to another mesh
-                other = other[0], run.state.system.carrier(other[0])
+            if (
+                other is not None and not end.system.outcomes.size
+            ):  # the end has mesh points where it meets corners, the state others
+                mesh = other[0]
+                mesh = (mesh.on_switches(run.state.system.carrier(mesh)(run.state.x)) or other)[0]
+                other = mesh, run.state.system.carrier(mesh)
             if other is None or not run.go_on(self.moved(run.state, run.here, other)):
                 break
             again, judged_again = self.steps.attempt(run.state, run.here(), step)

@@ -19,16 +19,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from contin.arrays import Array
+from contin.boundary.grazing import Touch
 from contin.continuation.failure import ended, met, no_convergence, runs_away, shorter_steps
 from contin.continuation.first import begins_outside, corrected_first, frozen, on_branch
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
-from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told
-from contin.continuation.rules import NOISY, length_of, predict
+from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told, unsettled
+from contin.continuation.rules import JUMPS, NOISY, judged, length_of, predict
 from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
+from contin.core.small import FAILED
 from contin.core.step import Reason, State, Stop, corrected, settled
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError, Grazing
@@ -238,14 +240,19 @@ class Continuation:
             if point.test in self._conditions:
                 yield from self._turn(point, arc)
                 return
+            behind = None
+            if isinstance(point.details, Touch):
+                point, behind = self._grazed(point, arc, any(each.label == Label.FOLD for each in found))
             if point.stop is not None:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
                 point = with_details(point, self.stop)
             if point.label != Label.BRANCH_POINT or not self._notes.phases(point, self._accuracy.error):
                 yield self._point(point, arc.state, change)
-            if self.stop is not None:
+            if self.go_on(None if behind is None else (behind, None)) or self.stop is not None:
                 return
-        self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
+        accepted = self._steps.accepted(arc, step.judgement, step.turns)
+        bends = any(isinstance(point.details, Touch) for point in found)  # how it bends before tells nothing of behind
+        self.go_on((dataclasses.replace(accepted, previous_tangent=None) if bends else accepted, step.end))
         if any(step.end.value(test) >= 0 for test in self._conditions):  # the equations are the same beyond
             self.state = dataclasses.replace(self.state, system=refrozen(step.end))
         for name in changed_between(arc.before, arc.trial) if self._curved else ():
@@ -298,6 +305,24 @@ class Continuation:
         if corner is not None:
             yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
 
+    def _grazed(self, point: SpecialPoint, arc: Arc, turned: bool) -> tuple[SpecialPoint, State | None]:
+        """Return a grazing point, as a fold where the parameter turns, and the state behind it if the step's end is none.
+
+        It is none where the branch bends too much there: switches lie inside intervals of its mesh.
+        """
+        behind: State | None = None
+        touch: Touch = point.details
+        if point.at >= arc.step or unsettled(arc.trial.settled, self.settings.mesh.tolerance, self.primary):
+            with contextlib.suppress(ConvergenceError):
+                behind = on_branch(*touch.beyond(point.trial, self.settings.newton), settings=self.settings, singular=False)
+                length, accepted = arc.state.arclength + point.at, arc.state.accepted + 1
+                behind = dataclasses.replace(behind, arclength=length, accepted=accepted)
+        ends = arc.state.tangent, (behind or arc.trial.settled).tangent
+        free = arc.state.system.free
+        rates = [tangent[free.index(self.primary) - len(free)] for tangent in ends]
+        details = dataclasses.replace(touch, folds=bool(rates[0] * rates[1] < 0 and not turned))
+        return dataclasses.replace(point, name=details.text, details=details), behind
+
     def _index_across(self, corner: SpecialPoint, ways: list[Way]) -> IndexChange | None:
         """Return the index before and behind a corner: what contacts hold does not move."""
         if self._watch.index is None or not ways:
@@ -342,10 +367,22 @@ class Continuation:
                     continue
                 home: SpecialPoint | None = state.system.home_ahead(state, step)
                 if home is not None and all(test.function(home.trial) <= 0 for test in self._limits):
-                    return home
+                    found = home if home.stop is not None else self._up_to(home)
+                    if found is not None:
+                        return found
             step, made = step / 2, None
             if step < settings.min_step:
                 raise problem
+
+    def _up_to(self, point: SpecialPoint) -> Step | None:
+        """Return the step from the state to a located point ahead, if it can be believed."""
+        arc = Arc(self.state, (0.0, self.here()), point.trial, point.at, self.settings.newton)
+        judgement = judged(self.state, self.predicted(point.at), point.trial, point.at, self.settings)
+        inspection = self._watch.inspection(arc)
+        if judgement.outcome in (FAILED, JUMPS) or self._watch.doubt(inspection):
+            return None
+        others = [other for other in inspection.special_points if not isinstance(other.details, Touch)]
+        return Step(arc, judgement, [*others, point], bool(inspection.folds))
 
     def _went_round(self, step: float, error: Grazing) -> bool:
         """Go on where a jump of the equations passes an end of the period in a step; return whether one did.

@@ -283,7 +283,7 @@ class Discretization(Equations, Protocol):
         return None
 
     def home_ahead(self, state: Any, step: float) -> Any:
-        """Return where the branch ends within a step that failed, if that is known."""
+        """Return where the branch ends or bends sharply within a step that failed, if that is known."""
         return None
 
     def home(self, arc: Any) -> Any:

@@ -11,7 +11,6 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
-from contin.boundary.crossings import jumping
 from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
 from contin.collocation.round import DRIFTED, FULL, Monodromy, ends_of_parts, extremes, fill_multipliers, larger, monodromy_of
@@ -88,7 +87,7 @@ class OfCycles(Discretization):
 
     def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
-        return [doubling(self.order), torus(), *(jumping() if self.outcomes.size else ())]
+        return [doubling(self.order), torus()]
 
     def events_on_folds(self: Any) -> list[Event]:
         """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
@@ -119,6 +118,10 @@ class PeriodicCollocation(OfCycles, Collocation):
         check_windings(problem.angles, self.free, values)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
         self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
+
+    def events(self) -> list[Event]:
+        """Return also those of conditions along the cycle."""
+        return [*super().events(), *self._of_conditions()]
 
     def duration(self, x: Array) -> float:
         """Return the period."""
@@ -579,7 +582,7 @@ class CycleCollocation(PeriodicCollocation):
     def events(self) -> list[Event]:
         """Return also that of homoclinic orbits; in the plane that alone: beside 1 there is one positive multiplier."""
         is_planar = self.states_count == 2 and self.order == 1 and not self.outcomes.size
-        return [homoclinic()] if is_planar else [*super().events(), homoclinic()]
+        return [homoclinic(), *(self._of_conditions() if is_planar else super().events())]
 
     @property
     def size_of_solutions(self) -> Event:
@@ -597,8 +600,8 @@ class CycleCollocation(PeriodicCollocation):
         return hopf_point_inside(self, arc)
 
     def home_ahead(self, state: State, step: float) -> SpecialPoint | None:
-        """Return the Hopf point to which the tangent leads within a step."""
-        return hopf_point_ahead(self, state, step)
+        """Return the Hopf point to which the tangent leads within a step, or a grazing point."""
+        return hopf_point_ahead(self, state, step) or super().home_ahead(state, step)
 
     def collapsed(self, x: Array, z: Array) -> bool:
         """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""

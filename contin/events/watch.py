@@ -64,6 +64,8 @@ class Watch:
             self._doubts.append(_contradicts(self.index))
         if self.ends:
             self._doubts.append(self._lost_end)
+        if any(test.label == Label.GRAZING for test in tests):
+            self._doubts.append(_lost_grazing)
         if settings.mesh.every:
             self._asks.append(lambda inspection: inspection.arc.is_moved)
             self._doubts.append(_moved_past(general, fold, settings))
@@ -209,6 +211,11 @@ def _lost_fold(primary: str) -> Doubts:
         return ""
 
     return doubt
+
+
+def _lost_grazing(inspection: Inspection) -> str:
+    lost = any(point.label == Label.GRAZING and not point.is_located for point in inspection.special_points)
+    return "a grazing point inside the step was not located" if lost else ""
 
 
 def _contradicts(index: Event) -> Doubts:

@@ -14,6 +14,7 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
+from contin.boundary.grazing import Touch
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.mesh import basis
 from contin.core.protocol import Discretization
@@ -287,7 +288,7 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
     if len(x) != system.size:
         raise ProblemError("the file is of version 0.2, which kept one point of a map's cycle only: follow it again")
     system = system.referring_to(x, tangent)
-    details: BranchPoint | MultiplePoint | Corner | dict[str, float] | None = row["details"]
+    details: BranchPoint | MultiplePoint | Corner | Touch | dict[str, float] | None = row["details"]
     if row.get("imperfection") is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
@@ -296,6 +297,9 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
         details = MultiplePoint(row["dimension"], kernel, x, tangents, row["continuum"], row.get("spread", 0.0))
     elif row.get("corner") is not None:
         details = Corner(row["corner"], tuple(arrays[f"tangents{number}"]), tuple(row["unstable"]))
+    elif row.get("touch") is not None:
+        times, folds, conditions, sides, names = row["touch"]
+        details = Touch(tuple(times), folds, tuple(conditions), tuple(sides), tuple(names), x)
     fields: dict[str, Any] = {name: tuple(value) if isinstance(value := row[name], list) else value for name in _FIELDS}
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(parameters=parameters, x=x, tangent=tangent, system=system, details=details, **fields)
