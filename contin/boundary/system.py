@@ -785,10 +785,14 @@ class Collocation(Composed):
         """Return the end of a run at a jump, with the conditions and times."""
         if not self.outcomes.size or stop.message not in ("met grazing", "met sliding"):
             return stop
-        found, why = crossing_places(self, trial.x), clearance(self, trial.x)
-        jumps = ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
-        text = why[1] if abs(why[0]) < APART and stop.event == "grazing" else f"jumps at {jumps}"
+        why = clearance(self, trial.x)
+        text = why[1] if abs(why[0]) < APART and stop.event == "grazing" else f"jumps at {self.jumps(trial.x)}"
         return replace(stop, message=f"{stop.message}: {text}")
+
+    def jumps(self, x: Array) -> str:
+        """Return the conditions and times of the jumps that a solution crosses."""
+        found = crossing_places(self, x)
+        return ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
 
     def events(self) -> list[Event]:
         """Return those of the statement and, where the equations jump, of crossings that end."""

@@ -393,7 +393,11 @@ _First = tuple[Defining, Array]
 
 def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hold: str | None) -> _First:
     """Return the defining system of the kind of a point; raise ProblemError if none can be followed."""
-    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
+    system: Any = start.system
+    base, x = system.with_free(names, start.x)
+    if base.outcomes.size:
+        raise ProblemError(f"start: the solution crosses jumps of the equations ({system.jumps(start.x)}), which curves in "
+                           "two parameters do not follow: trace it at several values of the second one")  # fmt: skip
     if event is not None:
         return _event(start, base, x, event)
     if hold is not None:

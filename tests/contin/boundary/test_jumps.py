@@ -146,6 +146,14 @@ def test_a_relay_and_its_multipliers():
         assert np.allclose(np.sort(np.exp(point.system.eigenvalues(point.x)).real), np.sort(multipliers), rtol=0, atol=1e-7)
 
 
+def test_curves_in_two_parameters_refuse_jumps():
+    names = {"a": 0.5, "b": 0.0}
+    problem = contin.BoundaryValueProblem(thresholds, lambda a, b, p: (a.x, b.x - 0.8 - p.b), ["x", "v"], names, domain=(0, 2))
+    point = contin.trace(contin.solve(problem, lambda t: (0.4 * t, 0.4)), free=["a"], limits={"a": (0.4, 0.6)})[-1]
+    with pytest.raises(contin.ProblemError, match="crosses jumps .*u.x > 0.3.* at t = "):
+        contin.curve(point, free=["a", "b"])
+
+
 def test_a_stored_cycle_keeps_its_multipliers(tmp_path):
     problem = contin.CycleProblem(welander, ["T", "S"], {"a": 1.2, "e": -0.01})
     branch = contin.trace(contin.cycle(problem, [0.5, 0.5]), free=["e", "period"], limits={"e": (-0.011, 0)}, max_points=3)
