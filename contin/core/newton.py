@@ -204,9 +204,11 @@ def _newton(
             if said == DIVERGES:
                 break
             if said == CONVERGED and fresh and size > newton.tolerance:  # as far as the updates before have said
-                residual = system.residual(x)
-                update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-                said = said if subtract(x.copy(), update) <= max(newton.tolerance, FAR * size) else FRESH
+                update = _update(system, x, factors, row, target)
+                if not subtract(x.copy(), update) <= max(newton.tolerance, FAR * size):
+                    _, now = system.linearize(x, rows)
+                    update = _update(system, x, now, row, target)
+                    said = CONVERGED if _strays(system, x, now, row, target, update).any() else FRESH
             if said == CONVERGED or (said == STAGNATES and _is_noise(system, x, update, rows, LOCATED)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(error / (size or 1.0), min(1.0, relative)) <= newton.tolerance:
@@ -243,16 +245,26 @@ def _settled(
         least, count = newton.tolerance * np.maximum(sizes(x), before), len(updates) + len(relative)
         if np.all(np.abs(update) <= least):
             return Corrected(x, factors, count, subtract(x, update))
-        now, beside = rounded_off(system, x, rows), x - _PART * update
-        residual = system.residual(beside)
-        left = factors.solve(residual if row is None else np.append(residual, row @ beside - target)) - (1 - _PART) * update
-        strays = (2 * np.abs(left) > _PART * np.abs(update)) & (np.abs(update) <= sizes(x))
+        now = rounded_off(system, x, rows)
+        strays = _strays(system, x, factors, row, target, update) & (np.abs(update) <= sizes(x))
         now = np.where(strays, np.maximum(now, np.abs(update)), now)
         if np.all(np.abs(update) <= np.maximum(least, UNITS * np.maximum(noise, now))):
             return Corrected(x, factors, count, float(np.max(np.abs(update) / (1 + np.abs(x)))))
         noise, before = now, sizes(update)
         subtract(x, update)
     raise _failure(relative)
+
+
+def _update(system: Equations, x: Array, factors: Factors, row: Array | None, target: float | Array) -> Array:
+    """Return the update at x with factors that are known."""
+    residual = system.residual(x)
+    return factors.solve(residual if row is None else np.append(residual, row @ x - target))
+
+
+def _strays(system: Equations, x: Array, factors: Factors, row: Array | None, target: float | Array, update: Array) -> Array:
+    """Return in which unknowns a small part of an update does not change the next one by that part: it is round-off."""
+    left = _update(system, x - _PART * update, factors, row, target) - (1 - _PART) * update
+    return 2 * np.abs(left) > _PART * np.abs(update)
 
 
 def _relative(update: Array, sizes: Array) -> float:
