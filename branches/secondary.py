@@ -40,23 +40,10 @@ from ribbon_model.modes import Mode
 def follow_all(result: Path, folder: Path, settings: list[str], progress: Progress) -> list[dict]:
     """Follow every secondary branch of a result, in the same folder as a diagram with the primary ones.
 
-    Raises StoreError or ConfigError for a result or a setting that cannot be used.
-
-    Parameters
-    ----------
-    result : Path
-        A branch file, or the folder of a diagram.
-    folder : Path
-        The folder for files and diagram.
-    settings : list of str
-        ``key=value`` changes of the scenes of the secondary branches; other fields are those of the primary ones.
-    progress : Progress
-        Shows how far the work is, and a line of text for every attempt.
-
-    Returns
-    -------
-    list of dict
-        Every attempt to switch branches, as kept in the diagram under ``switches`` (JSON).
+    The result is a branch file or the folder of a diagram. ``settings`` are ``key=value`` changes of the scenes of secondary
+    branches, whose other fields are those of the primary ones; ``progress`` shows a line of text for every attempt. Return the
+    attempts, as the diagram keeps them under ``switches`` (JSON). Raises StoreError or ConfigError for a result or a setting
+    that cannot be used.
     """
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)

@@ -134,13 +134,8 @@ def choose(branch, count: int, stages: set[int]) -> list[int]:
     labelled = branch.points["label"][kept] != b""
     spacing = (s[-1] - s[0]) / max(count - 1, 1) or 1.0
     again = {int(event["point"]) for event in branch.events if begins(event) and event["point"]}  # drawn before
-    chosen = []
-    for target in np.linspace(s[0], s[-1], count):
-        distance = np.abs(s - target) - 0.45 * spacing * labelled
-        best = int(kept[np.argmin(distance)])
-        if best not in chosen:
-            chosen.append(best)
-    return sorted(set(chosen) - again)
+    distances = np.abs(s - np.linspace(s[0], s[-1], count)[:, None]) - 0.45 * spacing * labelled
+    return sorted({*kept[np.argmin(distances, axis=1)].tolist()} - again)
 
 
 def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True, measured=MappingProxyType({})) -> None:

@@ -114,17 +114,10 @@ def meshed(shape: Shape | Structure, width: float, thickness: float | None) -> M
     Solids that meet overlap: programs that slice them for a printer take them as one body.
     """
     parts = parts_of(shape)
-    if thickness is None:
-        found = [surface(part, width) for part in parts]
-    else:
-        found = [solid(part, width, thickness) for part in parts]
+    found = [surface(part, width) if thickness is None else solid(part, width, thickness) for part in parts]
     first = np.cumsum([0, *(len(part.arclength) for part in parts)])  # node of each strip among all
-    found = [replace(mesh, stations=mesh.stations + start) for mesh, start in zip(found, first)]
-    for one, mesh in solids_of(shape, width):
-        if thickness is None or one.number:
-            continue
-        found.append(replace(mesh, stations=mesh.stations + first[one.part]))
-    return together(found)
+    beside = [] if thickness is None else [(mesh, first[one.part]) for one, mesh in solids_of(shape, width) if not one.number]
+    return together([replace(mesh, stations=mesh.stations + start) for mesh, start in (*zip(found, first), *beside)])
 
 
 def parts_of(shape: Shape | Structure) -> tuple[Shape, ...]:

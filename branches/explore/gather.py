@@ -55,10 +55,7 @@ def gather(results: list[str], quiet: bool = True) -> dict:
 def measured(path: str, axes: list) -> dict[str, list]:
     """Return the measured points of a file by columns of a map, whose ``axes`` are (name, title, brief).
 
-    Raises
-    ------
-    StoreError
-        See `branches.store.measured.read_points`; or two columns are missing.
+    Raises StoreError as `branches.store.measured.read_points` does, and where two columns are missing.
     """
     units = {name: brief.partition(" [")[2].rstrip("]") if brief.startswith(name) else "" for name, _, brief, *_ in axes}
     found = read_points(path, units)

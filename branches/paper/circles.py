@@ -226,9 +226,7 @@ def _modes(axes, law, m, window, top):
 
 
 def _bars(axes, cases, window, energy=False):
-    """A bar for each (law, m): blue where stable as published, orange elsewhere; with ``energy``, a black line where that
-    is what the energy says too.
-    """
+    """A bar for each (law, m): blue where stable as published, orange elsewhere; black where the ``energy`` says so, too."""
     for row, (law, m) in enumerate(cases):
         low, high = np.clip(stability_interval(law, m, NU), *window)
         axes.barh(

@@ -129,10 +129,7 @@ def version() -> str:
 
 
 def run_ccx(deck: str, time_limit: float, stopped: Callable[[], bool] = lambda: False) -> tuple[str, str]:
-    """Run CalculiX on a deck in a temporary folder, on one core.
-
-    Return the ``.dat`` file, which is incomplete if the run failed, and the reason of a failure, or ''.
-    """
+    """Run CalculiX on a deck, on one core; return the ``.dat`` file (incomplete after a failure) and why it failed, or ''."""
     with tempfile.TemporaryDirectory(prefix="ccx-") as name:
         folder = Path(name)
         (folder / "strip.inp").write_text(deck)

@@ -97,9 +97,9 @@ def run_many(
                 add(graph, parts[file])
         graph.graph.update({"config": dump(sweep), "failed": json.dumps(failed), "absent": json.dumps(sweep.absent)})
         save(graph, folder)
-    display.many_summary(
-        _summary(sweep, counts(graph, kind, sweep.title), failed, left_out, (time.perf_counter() - began, folder))
-    )
+    branches, special = counts(graph, kind, sweep.title)
+    told = [f"{branches} in {time.perf_counter() - began:.2f} s", f"  {special}", *_left_out(sweep, failed, left_out)]
+    display.many_summary([*told, f"  written to {folder} (diagram.json, diagram.graphml, one file per branch)"])
     return "lost" if failed else "complete"
 
 
@@ -166,17 +166,13 @@ def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -
     return {file: failed[file] for file in sweep.scenes if file in failed}, len(plan.left_out)
 
 
-def _summary(sweep: Sweep, counts: tuple[str, str], failed: dict[str, str], left_out: int, others) -> list[str]:
-    """Return the lines of the summary."""
-    seconds, folder = others
-    lines = [f"{counts[0]} in {seconds:.2f} s", f"  {counts[1]}"]
-    if left_out:
-        lines.append(f"  {left_out} duplicates (the same branches from their other ends) are merged")
+def _left_out(sweep: Sweep, failed: dict[str, str], merged: int) -> list[str]:
+    """Return the lines of the summary about what is not in the diagram as a branch of its own."""
+    lines = [f"  {merged} duplicates (the same branches from their other ends) are merged"] if merged else []
     lines += [f"  left out: {name}: {reason}" for name, reason in list(sweep.absent.items())[:MOST_ROWS]]
     if len(sweep.absent) > MOST_ROWS:
         lines.append(f"  left out: {len(sweep.absent) - MOST_ROWS} more, which diagram.json names (absent)")
-    lines += [f"  failed: {name}: {reason}" for name, reason in failed.items()]
-    return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file per branch)"]
+    return lines + [f"  failed: {name}: {reason}" for name, reason in failed.items()]
 
 
 def _load_kernels(scenes: list[Scene]) -> None:

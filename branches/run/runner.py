@@ -257,8 +257,7 @@ def _look_at(path: Path, scene: Scene, resume: bool, overwrite: bool) -> str | N
             f"{str(path)!r} exists and is not a readable result of this program; --overwrite replaces it"
         ) from error
     same = scene.up_to(stored.stage_count) if resume else scene
-    different = difference(stored, same, scene.CHANGEABLE if resume else ())
-    if different:
+    if different := difference(stored, same, scene.CHANGEABLE if resume else ()):
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
     if not resume:

@@ -85,10 +85,7 @@ def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
 
 
 def _sweep(kind: type[Scene], values: dict, lists: dict[tuple, list]) -> Sweep:
-    """Return the scenes of all combinations of the lists' values.
-
-    Raises ValueError for a field that is invalid in every combination, or a combination that is given twice.
-    """
+    """Return the scenes of all combinations of lists; raise ValueError for a field invalid in all, or a combination twice."""
     from branches.scene.sweep import Sweep, combinations  # most scenes are of one branch
 
     for place, entries in lists.items():

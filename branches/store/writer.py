@@ -55,21 +55,17 @@ def _empty_file(kind: str, units: str, states: tuple[str, ...], free: tuple[str,
             types = np.dtype([(name, of) for name, of, _ in columns])
             data = file.create_dataset(table, (0,), types, maxshape=(None,), chunks=(256,), fletcher32=True)
             data.attrs.update({name: words for name, _, words in columns})
-        _create_solutions(file.create_group("solutions"), states)
+        group = file.create_group("solutions")
+        kind = np.dtype([("point", "i4"), ("start", "i8"), ("count", "i4"), ("degree", "i4")])
+        index = group.create_dataset("index", (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
+        index.attrs["meaning"] = "rows start:start+count of t and states are the nodes of this point's solution"
+        t = group.create_dataset("t", (0,), "f8", maxshape=(None,), chunks=(1024,), fletcher32=True)
+        t.attrs["meaning"] = "nodes on the unit interval, arc length S = length * t; every degree-th is a mesh point"
+        n = len(states)
+        table = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n), fletcher32=True)
+        table.attrs["meaning"] = "unit quaternion of the directors (q0 scalar), then the centreline where it is a state"
+        table.attrs["columns"] = list(states)
     return memory.getvalue()
-
-
-def _create_solutions(group, names: tuple[str, ...]) -> None:
-    """Make the empty tables of the kept solutions."""
-    kind = np.dtype([("point", "i4"), ("start", "i8"), ("count", "i4"), ("degree", "i4")])
-    index = group.create_dataset("index", (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
-    index.attrs["meaning"] = "rows start:start+count of t and states are the nodes of this point's solution"
-    t = group.create_dataset("t", (0,), "f8", maxshape=(None,), chunks=(1024,), fletcher32=True)
-    t.attrs["meaning"] = "nodes on the unit interval, arc length S = length * t; every degree-th is a mesh point"
-    n = len(names)
-    states = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n), fletcher32=True)
-    states.attrs["meaning"] = "unit quaternion of the directors (q0 scalar), then the centreline where it is a state"
-    states.attrs["columns"] = list(names)
 
 
 def _image_of(first: Stage, tables: dict) -> bytes:
@@ -178,12 +174,9 @@ class BranchWriter:
             _extend(self._file[table], np.array([tuple(value(row) for value in values) for row in rows], self._types[table]))
         kept = [(row.point, row.number) for row in self._buffer if row.point.label or row.number % self._stride == 0]
         if kept:
-            group, rows = self._file["solutions"], []
-            start = len(group["t"])
-            for point, number in kept:
-                count = len(point.system.nodes)
-                rows.append((number, start, count, point.system.degree))
-                start += count
+            group, counts = self._file["solutions"], [len(point.system.nodes) for point, _ in kept]
+            starts = len(group["t"]) + np.cumsum([0, *counts[:-1]])
+            rows = [(number, *place, point.system.degree) for (point, number), *place in zip(kept, starts, counts)]
             _extend(group["index"], np.array(rows, group["index"].dtype))
             _extend(group["t"], np.concatenate([point.system.nodes for point, _ in kept]))
             _extend(group["states"], np.concatenate([point.system.states(point.x) for point, _ in kept]))

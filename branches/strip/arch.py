@@ -29,14 +29,8 @@ class Push(NamedTuple):
 def push(strip: Strip, distance: float, ends: str = "clamped", at: float = 0.5) -> Push:
     """Return the way of an arch whose place ``at`` is pushed towards the line of its ends, as far as it is stable.
 
-    Where a symmetric state becomes unstable, the way goes on along the branch that leaves there.
-
-    Raises
-    ------
-    ConfigError, ContinError
-        There is no such arch.
-    ValueError
-        The ends are too near or too far.
+    Where a symmetric state becomes unstable, the way goes on along the branch that leaves there. Raises ConfigError or
+    ContinError where there is no such arch, ValueError where the ends are too near or too far.
     """
     low = _NEAREST * strip.length
     if not low <= distance < strip.length:
