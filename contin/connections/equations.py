@@ -518,10 +518,7 @@ def _schur(matrix: Array) -> _Schur:
 
 
 def _left_subspace(transposed: _Schur, count: int, stable: bool) -> Array:
-    """Return a basis (count, n) of the left eigenvectors with the ``count`` least (stable) or largest real parts.
-
-    Raises ConvergenceError where the equilibrium has not so many.
-    """
+    """Return a basis (count, n) of left eigenvectors of least (stable) or largest real parts; ConvergenceError for too few."""
     from scipy.linalg.lapack import dtrsen
 
     t, v, rates = transposed

@@ -117,8 +117,7 @@ class Search:
         return {unknown: number.place for unknown, number in zip(self.unknowns, _unknowns(tape, self, operands))}
 
     def slopes_of_least(self, tape: Tape, operands: Sequence[Number]) -> list[Any]:
-        """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is
-        stationary."""
+        """Return the derivatives of the least value by what the potential reads, at fixed unknowns, as it is stationary."""
         by = derivatives.jacobian(tape, [self.potential], [operand.place for operand in operands])
         moved = tape.substitute(list(by.values()), self.solution(tape, operands))
         slopes = {number: Number(tape, place) for (_, number), place in zip(by, moved)}
@@ -126,8 +125,7 @@ class Search:
 
 
 def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
-    """Return the solution of a small linear system of recorded numbers: by elimination, with pivots chosen unless it is
-    symmetric and definite."""
+    """Return the solution of a small recorded linear system: elimination, with pivots unless it is symmetric and definite."""
     k = len(right)
     a, b = [list(row) for row in matrix], list(right)
     for i in range(k):

@@ -186,8 +186,7 @@ def _importable(function: object) -> bool:
 
 
 def _carried(value: object, arguments: Arguments | None, keep: Callable[[Any], bool]) -> Any:
-    """Return a value with recordings in the place of functions, except of those to keep and of those that cannot be
-    recorded."""
+    """Return a value with recordings in place of functions, except those to keep and those that cannot be recorded."""
     if isinstance(value, Mapping):
         return {name: _carried(each, arguments, keep) for name, each in value.items()}
     if arguments is None or not callable(value) or keep(value):

@@ -242,9 +242,8 @@ def _add_solutions(branches: list[AutoBranch], blocks: list[_Block], text: str) 
         first = next(i for i in [*range(first, len(blocks)), *range(first)] if wanted in _known(blocks[i]))
         names = blocks[first].names
         parameters = {names.get(i + 1, f"PAR({i + 1})"): value for i, value in enumerate(values[len(values) - head[11] :])}
-        branches[first].solutions.append(
-            AutoSolution(_label(head[2]), head[3], parameters, places[:, 0], places[:, 1:], head[9], head[10])
-        )
+        found = AutoSolution(_label(head[2]), head[3], parameters, places[:, 0], places[:, 1:], head[9], head[10])
+        branches[first].solutions.append(found)
         at += 1 + following
 
 

@@ -36,15 +36,10 @@ def with_guessed_multipliers(system: Collocation, states: Array) -> Array:
         coarse, _ = system.on_mesh(np.linspace(a, b, _MOST_INTERVALS + 1))
         sampled = np.stack([np.interp(coarse.nodes, system.nodes, column) for column in states.T], axis=1)
         fitted = _fitted(coarse, sampled)
-        return _packed(
-            system, states, coarse.evaluate(fitted, system.nodes)[:, states.shape[1] :], _multipliers(coarse, fitted)
-        )
+        values = dict(zip(coarse.problem.parameters, coarse.all_parameters(fitted)))
+        multipliers = np.array([values[name] for name in multipliers_of(coarse.problem)])
+        return _packed(system, states, coarse.evaluate(fitted, system.nodes)[:, states.shape[1] :], multipliers)
     return _fitted(system, states)
-
-
-def _multipliers(system: Collocation, x: Array) -> Array:
-    values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-    return np.array([values[name] for name in multipliers_of(system.problem)])
 
 
 def _packed(system: Collocation, states: Array, lam: Array, multipliers: Array) -> Array:

@@ -382,9 +382,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
 def _first(
     start: Point, settings: Settings, free: Sequence[str] | None, branch: int | None, tangent: Array | None
 ) -> tuple[Discretization, Array, Array | None, bool]:
-    """Return the system of a run, its first x, the tangent there where Newton's method shall not find it, and whether branches
-    cross there.
-    """
+    """Return system and first x of a run, the tangent where Newton's method shall not find it, and whether branches cross."""
     if start.system.on_curve and (free is not None or branch is not None and not finding_of(start.details).is_branch_point):
         start, free = _solution(start, free)
     system: Any = start.system

@@ -181,10 +181,7 @@ First = tuple[Discretization, Array, Array | None]
 
 
 def leaving(start: Point, kind: str, branch: int) -> First:
-    """Return where a curve begins that leaves from a point of codimension two.
-
-    Raises ProblemError where no such curve leaves there; ConvergenceError where it is not found.
-    """
+    """Return where a curve begins at a point of codimension two; raise ProblemError for no such curve, or ConvergenceError."""
     if kind not in start.curves:
         known = f"labelled {start.label!r}: {', '.join(start.curves) or 'none'}"
         raise ProblemError(f"kind: {kind!r} must be one of the curves that leave from the start, {known}")
