@@ -131,10 +131,7 @@ def strains_of(q: np.ndarray, rates: np.ndarray) -> np.ndarray:
 
 
 def moment_on_directors(q, lam) -> np.ndarray:
-    """Return the moment on the directors, shape (3, ...), from quaternions (4, ...) and their multipliers (4, ...).
-
-    2 M_i = lam . (q e_i).
-    """
+    """Return the moment on the directors (3, ...), 2 M_i = lam . (q e_i), from quaternions and their multipliers (4, ...)."""
     return np.array(moment_of(q, lam))
 
 

@@ -254,12 +254,8 @@ class Statement:
             key = member.section, member.strains, inside, differs, self._outline[0].get(name)
             if key not in densities:
                 densities[key] = self._hamiltonian(member, place)
-            segments.append(
-                contin.VariationalSegment(
-                    None, (*FRAME, *CENTRELINE, *self.integrals), member.length, hamiltonian=densities[key], work=work,
-                    functionals=self._functionals(),
-                )
-            )  # fmt: skip
+            states, own = (*FRAME, *CENTRELINE, *self.integrals), {"hamiltonian": densities[key], "work": work}
+            segments.append(contin.VariationalSegment(None, states, member.length, **own, functionals=self._functionals()))
         phases = list(self.integrals)[: len(self.phases)]
         return contin.SegmentedVariationalProblem(
             segments, self.parameters, ends=self._conditions(), end_energy=self._end_energy, sizes=self._sizes,
@@ -603,9 +599,7 @@ def _together(kind: str, axis: Vector, first, frame) -> list:
 
 def _from_drawing(q, drawn: tuple) -> tuple:
     """Return q conj(q0) of an end that is drawn with the quaternion q0."""
-    if drawn == _UNTURNED:
-        return tuple(q)
-    return product(q, (drawn[0], *(-x for x in drawn[1:])))
+    return tuple(q) if drawn == _UNTURNED else product(q, (drawn[0], *(-x for x in drawn[1:])))
 
 
 def joint_frame(q, drawn: tuple, each: JointEnd, p, part) -> tuple:

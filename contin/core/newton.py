@@ -16,7 +16,7 @@ import numpy as np
 
 from contin import draws
 from contin import errors as checks
-from contin.arrays import Array
+from contin.arrays import Array, Mask
 from contin.collocation import newton as one_call
 from contin.core.protocol import Equations
 from contin.errors import ConvergenceError, Within
@@ -261,7 +261,7 @@ def _update(system: Equations, x: Array, factors: Factors, row: Array | None, ta
     return factors.solve(residual if row is None else np.append(residual, row @ x - target))
 
 
-def _strays(system: Equations, x: Array, factors: Factors, row: Array | None, target: float | Array, update: Array) -> Array:
+def _strays(system: Equations, x: Array, factors: Factors, row: Array | None, target: float | Array, update: Array) -> Mask:
     """Return in which unknowns a small part of an update does not change the next one by that part: it is round-off."""
     left = _update(system, x - _PART * update, factors, row, target) - (1 - _PART) * update
     return 2 * np.abs(left) > _PART * np.abs(update)
