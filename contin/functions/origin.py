@@ -6,6 +6,7 @@ import linecache
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from types import CodeType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,12 +15,9 @@ from contin import errors as checks
 from contin.functions.batch import Batch
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import NUMPY
-from contin.functions.recording import record
-from contin.functions.tape import Frame, Number, Operation, Tape, Unrecordable
+from contin.functions.tape import LIBRARIES, Number, Operation, Tape
 from contin.text import COLUMNS
 
-#: Folders of code that is not the user's.
-_LIBRARIES = tuple(str(Path(file).parent) for file in (np.__file__, __file__))
 #: Operations that jump. Their derivatives are zero, so Newton's method does not see what they depend on.
 _JUMPS = ("lt", "le", "eq", "sign", "floor", "ceil", "trunc", "rint")
 #: Operations as they are written.
@@ -121,24 +119,6 @@ def _finite(number: Any) -> bool:
     return value is None or math.isfinite(value)
 
 
-class _Reached(BaseException):
-    """An operation is recorded; no user's function catches it."""
-
-
-class _Stopping(Tape):
-    """A tape that raises `_Reached` when it records the operation at a place."""
-
-    def __init__(self, stop: int) -> None:
-        super().__init__(NUMPY)
-        self._stop = stop
-
-    def _append(self, operation: Operation) -> int:
-        place = super()._append(operation)
-        if place == self._stop:
-            raise _Reached
-        return place
-
-
 def condition(batch: Batch, place: int, others: Sequence[int]) -> str:
     """Return what the user has written for a condition, and where it is one of ``others``, as in a loop, its equations."""
     found = source(batch, place)
@@ -154,36 +134,26 @@ def condition(batch: Batch, place: int, others: Sequence[int]) -> str:
 def source(batch: Batch, place: int) -> str:
     """Return what the user has written for an operation, with its line; "" where that is not known."""
     assert batch.recorded is not None
-    if stack := batch.recorded.recording.tape.stacks.get(place):
-        return _line(stack)
-    try:
-        record(batch.functions, batch.signature, _Stopping(place))
-    except (_Reached, Unrecordable) as error:
-        return _written(error)
-    return ""
+    known = batch.recorded.recording.tape.written.get(place)
+    return _line(*known) if known else ""
 
 
 def _written(error: BaseException) -> str:
     """Return what the user has written where an error is raised, with its line; "" where that is not known."""
-    trace, stack = error.__traceback__, list[Frame]()
+    trace, text = error.__traceback__, ""
     while trace is not None:
-        stack.insert(0, (trace.tb_frame.f_code, trace.tb_lasti, trace.tb_lineno))
+        code = trace.tb_frame.f_code
+        text = text if code.co_filename.startswith(LIBRARIES) else _line(code, trace.tb_lasti, trace.tb_lineno)
         trace = trace.tb_next
-    return _line(stack)
+    return text
 
 
-def _line(stack: Sequence[Frame]) -> str:
-    """Return what is written in the innermost frame that is the user's, with its line; "" where there is none."""
-    for code, instruction, number in stack:
-        if code.co_filename == record.__code__.co_filename:
-            break
-        if not code.co_filename.startswith((*_LIBRARIES, "<__array_function__")):
-            line, end, first, last = list(code.co_positions())[instruction // 2]
-            written = linecache.getline(code.co_filename, number).strip()
-            if line == end and first is not None and written:
-                written = linecache.getline(code.co_filename, number).encode()[first:last].decode()
-            return f"{written}, ".lstrip(", ") + f"line {number} of {Path(code.co_filename).name}"
-    return ""
+def _line(code: CodeType, instruction: int, number: int) -> str:
+    line, end, first, last = list(code.co_positions())[instruction // 2]
+    written = linecache.getline(code.co_filename, number).strip()
+    if line == end and first is not None and written:
+        written = linecache.getline(code.co_filename, number).encode()[first:last].decode()
+    return f"{written}, ".lstrip(", ") + f"line {number} of {Path(code.co_filename).name}"
 
 
 def _named(place: Place) -> str:

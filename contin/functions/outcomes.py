@@ -10,7 +10,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from contin.functions.tape import DECIDED, Number, Tape
+from contin.functions.tape import Number, Tape
+
+#: Operations that a number's sign decides.
+_DECIDED = ("lt", "le", "abs", "sign", "table")
 
 
 class Outcomes(NamedTuple):
@@ -41,7 +44,7 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int], along: C
     >>> tape.lines([*found.results, *found.numbers], {x.place: "x", tape.input(("side", 0)).place: "side"})
     ['(x - 1) * side', 'x - 1']
     """
-    if not any(operation.name in DECIDED for operation in tape.operations):
+    if not any(operation.name in _DECIDED for operation in tape.operations):
         return Outcomes(tuple(results), (), ())
     moves, zero = tape.reading([*results, *moving], moving), tape.constant(0.0)
     varies = tape.reading([*results, *along], along)

@@ -17,11 +17,10 @@ from __future__ import annotations
 import math
 import numbers
 import sys
-import traceback
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import CodeType
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,10 +33,9 @@ class Unrecordable(BaseException):
     """A function needs what recorded numbers lack, such as a value; no ``Exception``: a user's function must not catch it."""
 
 
-#: The code of a frame, and the instruction and the line that it has reached.
-Frame = tuple[CodeType, int, int]
-#: Operations that a number's sign decides.
-DECIDED = ("lt", "le", "abs", "sign", "table")
+#: Files of code that is not the user's begin so, and the one that calls the user's.
+LIBRARIES = (*(str(Path(file).parent) for file in (np.__file__, __file__)), "<__array_function__")
+_CALLS = str(Path(__file__).with_name("recording.py"))
 
 
 class Operation(NamedTuple):
@@ -56,7 +54,7 @@ class Tape:
       ``arrays.function(...)``.
     - ``decide`` (callable, optional): ``decide(condition)`` returns the outcome that the present recording assumes where a
       function asks for the truth of a number. Without it such a question raises `Unrecordable`.
-    - ``stacks`` (dict of list of Frame): Where a recorded function decides by an operation, by its place; inner frames first.
+    - ``written`` (dict): Code, instruction and line of the user that make an operation of a recorded function, by its place.
 
     Examples
     --------
@@ -72,7 +70,7 @@ class Tape:
         self.arrays = arrays
         self.decide: Callable[[int], bool] | None = None
         self.searches = 0  # in the present recording: names their unknowns
-        self.stacks: dict[int, list[Frame]] = {}
+        self.written: dict[int, tuple[Any, int, int]] = {}
         self._known: dict[Hashable, int] = {}
         self._results: dict[Hashable, Any] = {}
 
@@ -142,9 +140,12 @@ class Tape:
         if known is None:
             known = self._known[key] = len(self.operations)
             self.operations.append(operation)
-            if self.decide is not None and operation.name in DECIDED:
-                frames = traceback.walk_stack(sys._getframe(1))
-                self.stacks[known] = [(frame.f_code, frame.f_lasti, line) for frame, line in frames]
+            if self.decide is not None:
+                frame: Any = sys._getframe(1)
+                while (file := frame.f_code.co_filename).startswith(LIBRARIES) and file != _CALLS:
+                    frame = frame.f_back
+                if file != _CALLS:
+                    self.written[known] = frame.f_code, frame.f_lasti, frame.f_lineno
         return known
 
     def reading(self, places: Iterable[int], sources: Iterable[int]) -> list[bool]:
