@@ -136,6 +136,8 @@ def test_selections_without_decisions():
     assert np.allclose(value, [0.75, 0.75, 3], rtol=1e-15) and np.allclose(slope, [0, 0, 1], rtol=1e-15, atol=0)
     value, slope, _ = of_one(lambda u, p: np.clip(u.x, -1, 1) + np.sign(u.x) + math.floor(u.x) + u.x % 3, [-2.5, 0.5, 5.5])
     assert np.allclose(value, [-1 - 1 - 3 + 0.5, 0.5 + 1 + 0 + 0.5, 1 + 1 + 5 + 2.5]) and np.allclose(slope, [1, 2, 1])
+    value, slope, _ = of_one(lambda u, p: np.select([u.x < 0, u.x < 1], [u.x, 2 * u.x], 3 * u.x - 1), [-2.5, 0.5, 5.5])
+    assert np.allclose(value, [-2.5, 1, 15.5], rtol=1e-15) and np.allclose(slope, [1, 2, 3], rtol=1e-15)
 
 
 def test_a_loop_of_known_length_and_a_search():
