@@ -121,10 +121,10 @@ def _finite(number: Any) -> bool:
 
 def condition(batch: Batch, place: int, others: Sequence[int]) -> str:
     """Return what the user has written for a condition, and where it is one of ``others``, as in a loop, its equations."""
-    found = source(batch, place)
-    if not (batch.recorded and found) or [source(batch, other) for other in {*others}].count(found) < 2:
+    assert batch.recorded is not None
+    found, recording, names = source(batch, place), batch.recorded.recording, batch.signature.states
+    if not found or len(recording.results) < 2 or [source(batch, other) for other in {*others}].count(found) < 2:
         return found
-    recording, names = batch.recorded.recording, batch.signature.states
     reads = recording.tape.reading(recording.results, [place])
     rows = [row for row, result in enumerate(recording.results) if reads[result]]
     alike = len(recording.results) == len(names)
