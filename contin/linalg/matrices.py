@@ -158,8 +158,9 @@ class SparseFactors:
         self._lu: Any = None
         self._scale = np.ones(matrix.shape[0])
         if borders:
-            rows = abs(matrix.tocsr())
-            self._scale[-borders:] = _BORDER * (rows[:-borders].max() or 1.0) / (rows[-borders:].max() or 1.0)
+            sizes, within = np.abs(self._matrix.data), self._matrix.indices < matrix.shape[0] - borders
+            largest = [sizes[kept].max(initial=0.0) or 1.0 for kept in (within, ~within)]
+            self._scale[-borders:] = _BORDER * largest[0] / largest[1]
         self._matrix.data *= self._scale[self._matrix.indices]
         self._is_finite = bool(np.isfinite(matrix.data).all())
         if self._is_finite:
