@@ -15,7 +15,6 @@ parameters, tangents and multipliers are those of the solution with its jumps.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -25,12 +24,10 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.collocation.corners import Switching
 from contin.collocation.mesh import interpolation
-from contin.core.labels import Label
-from contin.core.trial import Event, Trial
 from contin.errors import Grazing
 from contin.functions.batch import Batch, Piecewise
 from contin.functions.origin import source
-from contin.levels import CORRECTED, DOUBLED, ROUGH
+from contin.levels import CORRECTED
 
 #: Largest part of its length that a piece between crossings loses in a step of Newton's method.
 _SHRINKS = 0.8
@@ -128,7 +125,7 @@ def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
     return found
 
 
-def _ends(system: Any, found: Sequence[Crossing]) -> Array:
+def ends_of(system: Any, found: Sequence[Crossing]) -> Array:
     """Return the mesh points at the ends of the pieces between crossings."""
     ends: Array = system.mesh[[0, *(each.node for each in found), -1]]
     return ends
@@ -139,7 +136,7 @@ def crossing_places(system: Any, x: Array) -> Switching:
     found, mesh, batch = system.crossings(x), system.mesh, system.problem.batch("field")
     origins = batch.conditions(range(len(batch.signature.parameters)))
     names = tuple(source(batch, origins[each.condition]) for each in found)
-    ends, delays = _ends(system, found), np.array([each.delay for each in found])
+    ends, delays = ends_of(system, found), np.array([each.delay for each in found])
     costs = [np.abs(each.shift / (1 + system.largest(x)[: each.gap.size])).max() for each in found]
     known = np.where(np.abs(delays) > CORRECTED * (mesh[-1] - mesh[0]), costs, 0.0)
     return Switching(ends[1:-1] + delays, known, np.full(len(found), True), names)
@@ -148,7 +145,7 @@ def crossing_places(system: Any, x: Array) -> Switching:
 def next_places(system: Any, x: Array) -> Array:
     """Return where crossings are; raise Grazing where a piece between them would lose most of its length."""
     found = crossing_places(system, x)
-    ends = _ends(system, system.crossings(x))
+    ends = ends_of(system, system.crossings(x))
     lost = np.diff([ends[0], *found.places, ends[-1]]) < (1 - _SHRINKS) * np.diff(ends)
     if lost.any():
         at = int(np.argmax(lost))
@@ -157,63 +154,6 @@ def next_places(system: Any, x: Array) -> Array:
         error.at_end = at in (0, len(found.places))
         raise error
     return found.places
-
-
-def _of(trial: Trial) -> Sequence[Crossing]:
-    found: Sequence[Crossing] = trial.settled.system.crossings(trial.settled.x)
-    return found
-
-
-@functools.cache
-def jumping() -> list[Event]:
-    """Return the test functions that end a run: where a piece vanishes, a threshold is touched, or a solution would slide."""
-
-    def shortest(trial: Trial) -> float:
-        found = _of(trial)
-        ends = _ends(trial.settled.system, found) + [0.0, *(each.delay for each in found), 0.0]
-        return float(np.diff(ends).min() / (ends[-1] - ends[0]) - DOUBLED)
-
-    def slides(trial: Trial) -> float:
-        return min((each.rates[1] for each in _of(trial)), default=1.0)
-
-    return [
-        Event(Label.GRAZING, "grazing", shortest, terminal=True),
-        Event(Label.GRAZING, "grazing", lambda trial: clearance(trial.settled.system, trial.settled.x)[0], terminal=True),
-        Event(Label.SLIDING, "sliding", slides, terminal=True),
-    ]
-
-
-def clearance(system: Any, x: Array) -> tuple[float, str]:
-    """Return the least distance from a jump between crossings, at a minimum of a number over t; and where that is.
-
-    It is positive on the side whose outcome is frozen. At corners the right sides differ in proportion to the number.
-    """
-    if not system.outcomes.size:
-        return 1.0, ""
-    batch, t, p = system.problem.batch("field"), system.gauss_times, system.all_parameters(x)
-    every, sides, best = range(p.size), system.outcomes.repeat(system.degree, axis=0), (1.0, "")
-
-    def there(times: Array) -> Array:
-        return deciding(batch, times, system.evaluate(x, times), p)
-
-    h = there(t) * sides
-    low = (h[1:-1] <= h[:-2]) & (h[1:-1] < h[2:]) & (sides[:-2] == sides[2:]) & (sides[1:-1] == sides[2:])
-    for i, k in np.argwhere(low).tolist():
-        side = sides[i + 1]
-        other = np.where(np.arange(side.size) == k, -side, side)
-        times = np.append(highest(there, t[i + 1 : i + 2], t[i + 2] - t[i], -side[k], k)[0], t[[i, i + 2]])
-        (f, g), u = (batch.frozen(every, each)[0] for each in (side, other)), system.evaluate(x, times)
-        gaps = np.abs(f.values(times, u, u[:0], p) - g.values(times, u, u[:0], p)).max(axis=1)
-        numbers = side[k] * there(times)[:, k]
-        far = 1 + int(np.argmax(np.abs(numbers[1:] - numbers[0])))
-        jumps = abs(gaps[0] - gaps[far] * abs(numbers[0] / numbers[far])) > ROUGH * gaps[far]
-        if jumps and numbers[0] < best[0]:
-            origin = batch.conditions(every)[k]
-            best = (
-                float(numbers[0]),
-                f"{source(batch, origin)}, where the equations jump, changes its sign at t = {times[0]:.6g}",
-            )
-    return best
 
 
 def highest(there: Any, at: Array, step: Any, side: Any, k: Any) -> tuple[Array, Array]:
@@ -244,7 +184,7 @@ def stepped(system: Any, x: Array, change: Array) -> tuple[Array, Array, Array]:
     moves = np.array(
         [each.delay + each.by_x @ np.append(change[:k].reshape(-1, n)[d * each.node], change[k:]) for each in found]
     )
-    ends, shorter = _ends(system, found), -np.diff(moves, prepend=0, append=0)
+    ends, shorter = ends_of(system, found), -np.diff(moves, prepend=0, append=0)
     part = min(1.0, _SHRINKS / max((shorter / np.diff(ends)).max(), _SHRINKS))
     blocks = (x + part * change)[:k].reshape(-1, n)[system.by_interval]
     blocks[at, 0] += part * np.array([each.gap for each in found]) * moves[:, None]

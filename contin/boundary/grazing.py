@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.boundary.crossings import deciding, highest, outcomes
+from contin.boundary.crossings import deciding, ends_of, highest, outcomes
 from contin.collocation.mesh import interpolation, moved_to_breaks
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
@@ -31,7 +31,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import Finding
 from contin.functions.origin import source
-from contin.levels import APART, BESIDE, DOUBLED, LOCATED, MOST_UPDATES, ROUGH
+from contin.levels import APART, BESIDE, DOUBLED, LOCATED, MOST_UPDATES, ROUGH, TINY
 
 #: Half the time, as a part of the domain, for which the equations are other ones at the first point behind a grazing point: the
 #: largest for which Newton's method converges is taken. At the last one the excess is round-off.
@@ -44,7 +44,19 @@ class Extremum(NamedTuple):
     condition: int
     time: float
     side: float
-    excess: float
+    excess: float = 0.0
+
+    def at(self, system: Any, x: Array) -> Extremum:
+        """Return the one near it of another solution."""
+        near, wide = [np.array([each]) for each in (self.time, self.side, self.condition)], np.diff(system.nodes).mean()
+        (time,), (excess,) = highest(_there(system, x), near[0], wide, *near[1:])
+        return self._replace(time=float(time), excess=float(excess))
+
+    def nearest(self, system: Any, others: list[Extremum]) -> Extremum | None:
+        """Return the one of the same kind that is nearest in time; None without any."""
+        rounds = system.order if system.is_cycle else np.inf
+        apart = [(min(abs(self.time - each.time), rounds - abs(self.time - each.time)), each) for each in others]
+        return min((each for each in apart if each[1][::2] == self[::2]), default=(0.0, None))[1]
 
 
 class Numbers(NamedTuple):
@@ -62,77 +74,77 @@ class Numbers(NamedTuple):
     extrema: list[Extremum]
 
 
-def numbers(trial: Trial) -> Numbers:
-    """Return the numbers that decide the conditions of a solution, over a whole round of a cycle."""
-    system, x = trial.settled.system, trial.settled.x
-    found: Numbers = system._once("numbers over t", x, lambda: _numbers(system, x))
-    return found
-
-
 def _there(system: Any, x: Array) -> Any:
     """Return the function that gives the numbers that decide at times, shape (times, conditions)."""
     batch, p = system.problem.batch("field"), system.all_parameters(x)
     return lambda times: deciding(batch, times, system.evaluate(x, times), p)
 
 
-def _numbers(system: Any, x: Array) -> Numbers:
-    nodes, there = system.nodes, _there(system, x)
-    t = np.sort(np.append(nodes, (nodes[1:] + nodes[:-1]) / 2))
-    t = t[np.unique(np.round((t - t[0]) / (t[-1] - t[0]) / BESIDE), return_index=True)[1]]  # closer ones differ by round-off
-    t[-1] = nodes[-1]
-    if system.is_cycle:
-        t = (t[:-1] + np.arange(system.order)[:, None]).ravel()
-        t = np.concatenate([[t[-1] - system.order], t, [t[0] + system.order]])
-    h = there(t)
-    change, sides = np.diff(h, axis=0), np.where(h >= 0, 1.0, -1.0)
-    zeros, ends = (sides[1:] != sides[:-1])[int(system.is_cycle) :].sum(axis=0), sides[[0, -1]] * (not system.is_cycle)
-    turn, spread = np.sign(change[:-1]) - np.sign(change[1:]), np.maximum(np.abs(change[:-1]), np.abs(change[1:]))
-    i, k = np.nonzero(np.abs(turn) == 2)
-    times, side = t[i + 1], turn[i, k] / 2
-    values = side * h[i + 1, k]
-    near = np.abs(values) <= 2 * spread[i, k]
-    if near.any():
+def numbers(system: Any, x: Array) -> Numbers:
+    """Return the numbers that decide the conditions of a solution, over a whole round of a cycle."""
+
+    def made() -> Numbers:
+        nodes, there, cyclic = system.nodes, _there(system, x), system.is_cycle
+        t = np.sort(np.append(nodes, (nodes[1:] + nodes[:-1]) / 2))
+        t = t[np.unique(np.round((t - t[0]) / np.ptp(t) / BESIDE), return_index=True)[1]]  # closer ones differ by round-off
+        t[-1] = nodes[-1]
+        if cyclic:
+            t = (t[:-1] + np.arange(system.order)[:, None]).ravel()
+            t = np.concatenate([[t[-1] - system.order], t, [t[0] + system.order]])
+        h = there(t)
+        change, sides, sizes = np.diff(h, axis=0), np.where(h >= 0, 1.0, -1.0), np.ptp(h, axis=0)
+        zeros = (sides[1:] != sides[:-1])[int(cyclic) :].sum(axis=0)
+        i, k = np.nonzero(np.sign(change[:-1]) * np.sign(change[1:]) < 0)
+        times, side = t[i + 1], np.sign(change[i, k])
+        values = side * h[i + 1, k]
+        near = np.abs(values) <= 2 * np.maximum(np.abs(change[i, k]), np.abs(change[i + 1, k]))
         times[near], peaks = highest(there, times[near], (t[i + 2] - t[i])[near] / 2, side[near], k[near])
-        crosses = peaks > LOCATED * np.ptp(h, axis=0)[k[near]]  # one that touches does not cross
+        crosses = peaks > LOCATED * sizes[k[near]]  # one that touches does not cross
         np.add.at(zeros, k[near], 2 * crosses - 2 * (values[near] > 0))
         values[near] = peaks
-    extrema = [Extremum(*each) for each in zip(k.tolist(), times.tolist(), side.tolist(), values.tolist())]
-    return Numbers(zeros, ends, np.ptp(h, axis=0), extrema)
+        extrema = [Extremum(*each) for each in zip(*(each.tolist() for each in (k, times, side, values)))]
+        return Numbers(zeros, sides[[0, -1]] * (not cyclic), sizes, extrema)
+
+    found: Numbers = system._once("numbers over t", x, made)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class Touch(Finding):
     """A grazing point.
 
-    - ``times`` (tuple of float): When the numbers touch zero, as parts of the domain or of the part of a cycle.
+    - ``names`` (tuple of str): The conditions, as they are written.
+    - ``extrema`` (tuple of Extremum): Of the numbers that touch zero.
     - ``folds`` (bool): The primary parameter turns there.
     """
 
-    times: tuple[float, ...]
-    folds: bool
-    conditions: tuple[int, ...]
-    sides: tuple[float, ...]
     names: tuple[str, ...]
+    extrema: tuple[Extremum, ...]
     x: Array
+    folds: bool = False
     nullity = 0
     has_equations = True
 
     @property
+    def times(self) -> tuple[float, ...]:
+        """When the numbers touch zero: values of t; of a cycle, parts of the period or of what a symmetry leaves of it."""
+        return tuple(each.time for each in self.extrema)
+
+    @property
     def text(self) -> str:
         """What touches, and when."""
-        places = " and ".join(f"{name}, at t = {time:.6g}" for name, time in zip(self.names, self.times))
-        return f"{places}: fold" if self.folds else places
+        places = (f"{name}, at t = {time:.6g}" for name, time in zip(self.names, self.times))
+        return " and ".join(places) + ": fold" * self.folds
 
     @property
     def numbers(self) -> dict[str, Any]:
         """What is stored."""
-        return {"touch": [self.times, self.folds, self.conditions, self.sides, self.names]}
+        return {"touch": [self.names, self.extrema, self.folds]}
 
     def again(self, system: Any, carry: Carrier, x: Array, newton: Newton) -> Touch:
         """Return the same on another mesh."""
-        x, _ = _touching(system, carry(x), self.conditions[0], self.times[0], self.sides[0], newton)
-        times = [_excess(system, x, Extremum(*each, 0.0))[0] for each in zip(self.conditions, self.times, self.sides)]
-        return replace(self, x=x, times=tuple(times))
+        x = _touching(system, carry(x), self.extrema[0], newton)
+        return replace(self, x=x, extrema=tuple(each.at(system, x) for each in self.extrema))
 
     def beyond(self, trial: Trial, newton: Newton) -> tuple[Any, Array, Array]:
         """Return system, x and tangent of a point behind this one; raise ConvergenceError where none is found.
@@ -140,90 +152,74 @@ class Touch(Finding):
         The excess of the first number is held, and mesh points lie where the numbers change their signs. Where it falls there
         is no need: the solution becomes smooth.
         """
-        system, there, problem = trial.system, _there(trial.system, trial.x), ConvergenceError("no point is found behind it")
-        length, close = system.mesh[-1] - system.mesh[0], ROUGH * (system.mesh[-1] - system.mesh[0])
-        rows = [side * _number(system, trial.x, k, t)[1] for k, t, side in zip(self.conditions, self.times, self.sides)]
-        rates = np.array(rows) @ trial.tangent
-        if rates[0] < 0:
-            raise problem
-        bends = np.array([
-            -side * (there(t + close * np.array([-1.0, 0.0, 1.0]))[:, k] @ [1, -2, 1]) / close**2
-            for k, t, side in zip(self.conditions, self.times, self.sides)
-        ])  # fmt: skip
-        for last in _LASTS:
-            ahead = bends[0] * (last * length) ** 2 / 2 / rates[0]
-            lasts = np.sqrt(np.maximum(2 * rates * ahead / bends, 0))
-            places = np.array(self.times)[:, None] + lasts[:, None] * [-1, 1]
-            if system.is_cycle:
-                places = places % 1.0
-            breaks = np.unique(np.append(system._all_breaks(trial.x, closely=False), places))
-            other, carry = system.on_mesh(moved_to_breaks(system.mesh, breaks))
-            x = carry(trial.x + ahead * trial.tangent)
+        system, first, problem = trial.system, self.extrema[0], ConvergenceError("no point is found behind it")
+        length, around = np.ptp(system.mesh), first.time + ROUGH * np.ptp(system.mesh) * np.array([-1.0, 0.0, 1.0])
+        bend = -first.side * (_there(system, trial.x)(around)[:, first.condition] @ [1, -2, 1]) / (ROUGH * length) ** 2
+        rate = first.side * _number(system, trial.x, first)[1] @ trial.tangent
+        for last in _LASTS if rate > 0 else ():
+            places = np.add.outer(self.times, [-last * length, last * length]).ravel()
+            breaks = np.append(system._all_breaks(trial.x, closely=False), places % 1.0 if system.is_cycle else places)
+            other, carry = system.on_mesh(moved_to_breaks(system.mesh, np.unique(breaks)))
+            x = carry(trial.x + bend * (last * length) ** 2 / 2 / rate * trial.tangent)
             try:
                 for _ in range(ROUNDS):
-                    row = _number(other, x, self.conditions[0], self.times[0])[1]
+                    row = _number(other, x, first)[1]
                     x = correct(other, x, row, row @ x, newton).x
                     moved = other.on_switches(x)
                     if moved is None:
-                        return other, x, linearization(other, x, self.sides[0] * row).tangent
+                        return other, x, linearization(other, x, first.side * row).tangent
                     other, x = moved[0], moved[1](x)
             except ConvergenceError as error:
                 problem = error
         raise problem
 
 
-def _number(system: Any, x: Array, k: int, time: float) -> tuple[float, Array, float]:
+def _number(system: Any, x: Array, at: Extremum) -> tuple[float, Array, float]:
     """Return a number that decides, its derivatives by x, and by how much the equations' derivatives jump where it is zero.
 
     The last is relative to the largest; it is NaN where the equations jump themselves.
     """
-    n, batch, every, rounds = system.states_count, system._field, range(len(system.parameters)), 0
-    if system.is_cycle:
-        rounds, time = int(np.floor(time)), time % 1.0
-    times = np.array([time + rounds])
+    n, k, rounds = system.states_count, at.condition, int(np.floor(at.time)) if system.is_cycle else 0
+    times, every, time = np.array([at.time]), range(len(system.parameters)), at.time - rounds
     side = outcomes(system.problem.batch("field"), times, system.evaluate(x, times), system.all_parameters(x))[0]
     given = times, system.evaluate(x, times) / system.scales.states, np.empty((0, n)), system.scaled_parameters(x)
-    (f, number), (g, _) = batch.frozen(every, side), batch.frozen(every, np.where(np.arange(side.size) == k, -side, side))
+    (f, number), (g, _) = (
+        system._field.frozen(every, each) for each in (side, np.where(np.arange(side.size) == k, -side, side))
+    )
     columns = number.columns(system._free)
-    values, slopes = number.jacobian(*given, columns)
-    by_state = slopes[0, k, :n] @ np.linalg.matrix_power(system.turn, rounds) if rounds else slopes[0, k, :n]
+    (value,), (slope,) = (each[0, [k]] for each in number.jacobian(*given, columns))
+    by_state = slope[:n] @ np.linalg.matrix_power(system.turn, rounds) if rounds else slope[:n]
     j = min(max(int(np.searchsorted(system.mesh, time, side="right")) - 1, 0), system.intervals - 1)
     within = np.array([(time - system.mesh[j]) / (system.mesh[j + 1] - system.mesh[j])])
-    row = np.append(np.zeros(system.state_size), slopes[0, k, n:])
+    row = np.append(np.zeros(system.state_size), slope[n:])
     weights = interpolation(system.basis.nodes, system.basis.barycentric, within)[0]
     row[: system.state_size].reshape(-1, n)[system.by_interval[j]] = np.outer(weights, by_state)
     (one, by_one), (two, by_two) = (each.jacobian(*given, columns) for each in (f, g))
-    jumps = np.abs(one - two).max() > ROUGH * np.abs(one).max() + abs(values[0, k]) * np.abs(by_one - by_two).max()
-    return float(values[0, k]), row, np.nan if jumps else float(np.abs(by_one - by_two).max() / np.abs(by_one).max())
+    change, gap = np.abs(by_one - by_two).max(), np.abs(one - two).max()  # of a corner the gap is in proportion to the number
+    jumps = gap > ROUGH * np.abs(one).max() + 2 * abs(value) * change / max(np.abs(slope).max(), TINY)
+    return float(value), row, np.nan if jumps else float(change / np.abs(by_one).max())
 
 
-def _touching(system: Any, x: Array, k: int, time: float, side: float, newton: Newton) -> tuple[Array, float]:
-    """Return the solution near x at which a number touches zero near a time, and the time; raise ConvergenceError without."""
+def _touching(system: Any, x: Array, near: Extremum, newton: Newton) -> Array:
+    """Return the solution near x at which a number touches zero; raise ConvergenceError where none is found."""
     last = np.inf
     for _ in range(MOST_UPDATES):
-        time, _ = _excess(system, x, Extremum(k, time, side, 0.0))
-        value, row, _ = _number(system, x, k, time)
+        near = near.at(system, x)
+        value, row, _ = _number(system, x, near)
         residual, factors = system.linearize(x, (row,))
         change = factors.solve(np.append(residual, value))
         x, size = x - change, float(np.abs(change / (1 + np.abs(x))).max())
         if size <= newton.tolerance or LOCATED > size > last / 2:
-            return x, time
+            return x
         last = size
     raise ConvergenceError("the grazing point is not found")
 
 
 def _changes(arc: Arc) -> Indices:
     """Return by how much the numbers of zeros change in a step, but for those that pass an end of the domain."""
-    first, last = numbers(arc.before), numbers(arc.trial)
+    first, last = (numbers(end.settled.system, end.settled.x) for end in (arc.before, arc.trial))
     change = last.zeros - first.zeros
     return np.where(np.abs(change) > (first.ends != last.ends).sum(axis=0), change, 0)
-
-
-def _excess(system: Any, x: Array, each: Extremum) -> tuple[float, float]:
-    """Return time and excess of an extremum that is near a known one of another solution."""
-    wide = np.array([np.diff(system.nodes).mean()])
-    time, value = highest(_there(system, x), np.array([each.time]), wide, np.array([each.side]), np.array([each.condition]))
-    return float(time[0]), float(value[0])
 
 
 def _located(arc: Arc, pending: list[Extremum]) -> tuple[SpecialPoint | None, list[Extremum]]:
@@ -231,53 +227,41 @@ def _located(arc: Arc, pending: list[Extremum]) -> tuple[SpecialPoint | None, li
 
     There is no point where the number has no corner.
     """
-    system: Any = arc.state.system
-    first, k = pending[0], pending[0].condition
-    batch, before, after = system.problem.batch("field"), *(_excess(system, end.x, first)[1] for end in (arc.before, arc.trial))
-    middle = arc.low + (arc.step - arc.low) * float(np.clip(before / (before - after), 0, 1)) if before != after else arc.step
+    system, first = cast(Any, arc.state.system), pending[0]
+    before, after = (first.at(system, end.x).excess for end in (arc.before, arc.trial))
+    part = float(np.clip(before / (before - after), 0, 1)) if before != after else 1.0
+    batch, x = system.problem.batch("field"), arc.guess(arc.low + (arc.step - arc.low) * part)
     names = [source(batch, place) for place in batch.conditions(range(len(system.parameters)))]
     try:
-        x = arc.guess(middle)
-        near = _nearest(first, _numbers(system, x).extrema, system) or first
-        if np.isnan(_number(system, x, k, near.time)[2]):
+        near = first.nearest(system, numbers(system, x).extrema) or first
+        if np.isnan(_number(system, x, near)[2]):
             return None, pending[1:]  # the equations jump
-        x, time = _touching(system, x, k, near.time, first.side, arc.newton)
+        x = _touching(system, x, near, arc.newton)
         at = inner(system, arc.state.tangent, x - arc.state.x)
         if not arc.low - APART * arc.step <= at <= (1 + APART) * arc.step or not arc.passes_by(x, at):
             raise ConvergenceError("it is no point of the step")
     except ConvergenceError:
-        return SpecialPoint(arc.step, Label.GRAZING, f"grazing: {names[k]}", arc.trial, is_located=False), pending[1:]
+        name = f"grazing: {names[first.condition]}"
+        return SpecialPoint(arc.step, Label.GRAZING, name, arc.trial, is_located=False), pending[1:]
     there = Trial(system, x, lambda: linearization(system, x, arc.state.row))
-    known = numbers(settled(there, arc.state.tangent, arc.newton))  # where the equations' other corners are at mesh points
-    one = _nearest(first._replace(time=time), known.extrema, system)
-    every = [each for each in known.extrema if one and abs(each.excess - one.excess) < DOUBLED * known.sizes[each.condition]]
-    every = sorted(every, key=lambda each: each is not one) or [first._replace(time=time)]
-    left = [other for other in pending if other is not first]
-    left = [other for other in left if all(other is not _nearest(each, pending, system) for each in every)]
-    matters = [each for each in every if _number(system, x, each.condition, each.time)[2] > LOCATED]
-    if not matters:
-        return None, left
-    conditions, times, sides, _ = zip(*matters)
-    touch = Touch(times, False, conditions, sides, tuple(names[k] for k in conditions), x)
-    return SpecialPoint(at, Label.GRAZING, touch.text, there, details=touch), left
-
-
-def _nearest(one: Extremum, others: list[Extremum], system: Any) -> Extremum | None:
-    """Return the extremum of the same kind that is nearest in time to one; None without any."""
-    round_ = system.order if system.is_cycle else np.inf
-
-    def apart(other: Extremum) -> float:
-        return min(abs(one.time - other.time), round_ - abs(one.time - other.time))
-
-    return min((each for each in others if each[::2] == one[::2]), key=apart, default=None)
+    end = settled(there, arc.state.tangent, arc.newton).settled  # where the equations' other corners are at mesh points
+    known, one = numbers(end.system, end.x), near.at(end.system, end.x)
+    one = one.nearest(system, known.extrema) or one
+    every = [each for each in known.extrema if abs(each.excess - one.excess) < DOUBLED * known.sizes[each.condition]]
+    every = sorted({one, *every}, key=lambda each: each != one)
+    met = [first, *(each.nearest(system, pending) for each in every)]
+    matters = [each for each in every if _number(system, x, each)[2] > LOCATED]
+    touch = Touch(tuple(names[each.condition] for each in matters), tuple(matters), x)
+    point = SpecialPoint(at, Label.GRAZING, touch.text, there, details=touch) if matters else None
+    return point, [each for each in pending if each not in met]
 
 
 def _search(arc: Arc, _: object) -> list[SpecialPoint]:
     """Return the grazing points inside a step, those at which several numbers touch zero once."""
     change, pending, found = _changes(arc), list[Extremum](), list[SpecialPoint]()
     for k in np.flatnonzero(change).tolist():
-        more = numbers(arc.trial if change[k] > 0 else arc.before).extrema
-        new = [each for each in more if each.condition == k and each.excess > 0]
+        more = (arc.trial if change[k] > 0 else arc.before).settled
+        new = [each for each in numbers(more.system, more.x).extrema if each.condition == k and each.excess > 0]
         pending += sorted(new, key=lambda each: each.excess)[: abs(change[k]) // 2]
     while pending:
         point, pending = _located(arc, pending)
@@ -290,11 +274,11 @@ def touch_ahead(state: State, step: float) -> SpecialPoint | None:
 
     No step passes one behind which the branch bends too sharply.
     """
-    here, guess = Linearization(state.tangent, state.sign), state.x + step * state.tangent
-    arc = Arc(state, (0.0, Trial(state.system, state.x, here)), Trial(state.system, guess, here), step, Newton())
-    if state.singular or not _changes(arc).any():
-        return None
-    return min((point for point in _search(arc, None) if point.is_located), key=lambda point: point.at, default=None)
+    here = Linearization(state.tangent, state.sign)
+    ends = [Trial(state.system, state.x + way * state.tangent, here) for way in (0.0, step)]
+    arc = Arc(state, (0.0, ends[0]), ends[1], step, Newton())
+    points = _search(arc, None) if not state.singular else []
+    return min((point for point in points if point.is_located), key=lambda point: point.at, default=None)
 
 
 @functools.cache
@@ -302,3 +286,40 @@ def grazing() -> Event:
     """Return the test function of grazing points of equations that do not jump."""
     asks = lambda arc: bool(_changes(arc).any())  # noqa: E731
     return Event(Label.GRAZING, "grazing", lambda _: 1.0, asks=asks, search=_search)
+
+
+@functools.cache
+def jumping() -> list[Event]:
+    """Return the test functions that end a run: where a piece vanishes, a threshold is touched, or a solution would slide."""
+
+    def of(trial: Trial) -> Any:
+        return trial.settled.system.crossings(trial.settled.x)
+
+    def shortest(trial: Trial) -> float:
+        ends = ends_of(trial.settled.system, of(trial)) + [0.0, *(each.delay for each in of(trial)), 0.0]
+        return float(np.diff(ends).min() / (ends[-1] - ends[0]) - DOUBLED)
+
+    def slides(trial: Trial) -> float:
+        return min((each.rates[1] for each in of(trial)), default=1.0)
+
+    return [
+        Event(Label.GRAZING, "grazing", shortest, terminal=True),
+        Event(Label.GRAZING, "grazing", lambda trial: clearance(trial.settled.system, trial.settled.x)[0], terminal=True),
+        Event(Label.SLIDING, "sliding", slides, terminal=True),
+    ]
+
+
+def clearance(system: Any, x: Array) -> tuple[float, str]:
+    """Return the least distance from a jump between crossings, at an extremum of a number over t; and where that is.
+
+    It is positive on the side whose outcome is frozen.
+    """
+    if not system.outcomes.size:
+        return 1.0, ""
+    for each in sorted(numbers(system, x).extrema, key=lambda each: -each.excess):
+        k, t, batch = each.condition, each.time, system.problem.batch("field")
+        at = np.searchsorted(system.mesh, t % 1.0 if system.is_cycle else t, side="right") - 1
+        if system.outcomes[np.clip(at, 0, system.intervals - 1), k] != each.side and np.isnan(_number(system, x, each)[2]):
+            name = source(batch, batch.conditions(range(len(system.parameters)))[k])
+            return -each.excess, f"{name}, where the equations jump, changes its sign at t = {t:.6g}"
+    return 1.0, ""

@@ -20,16 +20,14 @@ from contin.arrays import Array, Indices, Places
 from contin.boundary.crossings import (
     Crossing,
     changes,
-    clearance,
     crossing_places,
     crossings,
     frozen,
-    jumping,
     next_places,
     outcomes,
     stepped,
 )
-from contin.boundary.grazing import grazing, touch_ahead
+from contin.boundary.grazing import clearance, grazing, jumping, touch_ahead
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect

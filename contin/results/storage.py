@@ -14,7 +14,7 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
-from contin.boundary.grazing import Touch
+from contin.boundary.grazing import Extremum, Touch
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.mesh import basis
 from contin.core.protocol import Discretization
@@ -298,8 +298,8 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
     elif row.get("corner") is not None:
         details = Corner(row["corner"], tuple(arrays[f"tangents{number}"]), tuple(row["unstable"]))
     elif row.get("touch") is not None:
-        times, folds, conditions, sides, names = row["touch"]
-        details = Touch(tuple(times), folds, tuple(conditions), tuple(sides), tuple(names), x)
+        names, extrema, folds = row["touch"]
+        details = Touch(tuple(names), tuple(Extremum(*each) for each in extrema), x, folds)
     fields: dict[str, Any] = {name: tuple(value) if isinstance(value := row[name], list) else value for name in _FIELDS}
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(parameters=parameters, x=x, tangent=tangent, system=system, details=details, **fields)

@@ -393,8 +393,8 @@ def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hol
     system: Any = start.system
     base, x = system.with_free(names, start.x)
     if base.outcomes.size:
-        raise ProblemError(f"start: the solution crosses jumps of the equations ({system.jumps(start.x)}), which curves in "
-                           "two parameters do not follow: trace it at several values of the second one")  # fmt: skip
+        jumps = f"start: the solution crosses jumps of the equations ({system.jumps(start.x)})"
+        raise ProblemError(f"{jumps}, which curves do not follow: trace it at several values of {names[-1]}")
     if event is not None:
         return _event(start, base, x, event)
     if hold is not None:
