@@ -92,7 +92,10 @@ def floquet(
     finer: Any
     finer, carry = system.refined()  # type: ignore[misc]  # there is a mesh
     try:
-        again = _corrected(finer, carry(x), carry(tangent))
+        again, along = _corrected(finer, carry(x), carry(tangent)), carry(tangent)
+        if (moved := finer.on_switches(again, closely=True)) is not None:  # they depend on the places of corners themselves
+            finer, carry = moved
+            again = _corrected(finer, carry(again), carry(along))
         found = _apart(values, finer.solution.eigenvalues(again[: finer.solution.size]))
     except ConvergenceError:
         found = np.full(values.shape, np.nan)
