@@ -292,10 +292,10 @@ def largest_change(n: int, length: float, rates: Matrix, changed: Matrix, least:
         rate, change = 0.0, 0.0
         for j in range(rates.shape[0]):
             difference = abs(changed[j, a] - rates[j, a])
-            if difference > change:
-                change = difference
-            if abs(rates[j, a]) > rate and rates[j, a] - rates[j, a] == 0:
-                rate = abs(rates[j, a])
+            if rates[j, a] - rates[j, a] == 0:
+                rate = max(rate, abs(rates[j, a]))
+                if difference > change:
+                    change = difference
         size = change * length / (1 + rate * length)
         if size > largest:
             largest = size

@@ -1,5 +1,6 @@
 """Jumps of the equations that the solution decides: relays, bang-bang controls, switches with a threshold."""
 
+import functools
 import math
 
 import numpy as np
@@ -268,3 +269,41 @@ def test_random_relays(seed):
     assert abs(cycle["period"] / (2 * h) - 1) < 1e-9
     found = np.exp(cycle.system.eigenvalues(cycle.x))
     assert all(abs(found - value).min() < 1e-6 for value in np.linalg.eigvals(half @ half))
+
+
+def test_the_edge_of_the_ice():
+    """Budyko's climate with diffusion (North 1975), singular at the pole, x = 1: its flux is zero there up to round-off.
+
+    The sum over Legendre polynomials, of which 280 are taken, gives Q for an edge; it is known to 1e-5.
+    """
+    legendre = np.polynomial.legendre
+
+    def sun(x):
+        return 1 - 0.241 * (3 * x**2 - 1)
+
+    def field(x, u, p):
+        return u.flux / (1 - x**2), (203.3 + 2.09 * u.T - p.Q * sun(x) * (0.68 if u.T > -10 else 0.38)) / 0.4363
+
+    nodes, weights = legendre.leggauss(600)
+
+    def sum_over(edge):
+        n = np.arange(0, 561, 2)
+        water, ice = edge * (nodes + 1) / 2, edge + (1 - edge) * (nodes + 1) / 2
+        absorbed = [(weights * sun(x)) @ legendre.legvander(x, 560) / 2 for x in (water, ice)]
+        parts = (2 * n + 1) * (0.68 * edge * absorbed[0] + 0.38 * (1 - edge) * absorbed[1])[::2]
+        return (203.3 / 2.09 - 10) / np.sum(
+            parts * legendre.legvander(np.array([edge]), 560)[0, ::2] / (n * (n + 1) * 0.4363 + 2.09)
+        )
+
+    def guess(fall, x):
+        return 15 - fall * x**2, -2 * fall * x * (1 - x**2)
+
+    problem = contin.BoundaryValueProblem(field, lambda a, b, p: (a.flux, b.flux), ["T", "flux"], {"Q": 344.0})
+    for first, fall, limits, labels in ((342.5, 35, (342, 345), []), (347.07, 27, (347.06, 348), ["LP"])):
+        start = contin.solve(problem, functools.partial(guess, fall), {"Q": first})
+        branch = contin.trace(start, free=["Q"], limits={"Q": limits})
+        assert [point.label for point in branch[1:-1] if point.label] == labels and branch.stop.reason == "limit"
+        assert max(point.system.intervals for point in branch) <= 40
+        for point in branch[::8]:
+            (crossing,) = point.system.crossings(point.x)
+            assert abs(sum_over(point.system.mesh[crossing.node]) - point["Q"]) < 1e-5
