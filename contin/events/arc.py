@@ -240,11 +240,6 @@ class Arc:
         #: Newton's method, does so in other steps.
         self._factors = trial.factors if trial.is_linearized else None
 
-    @property
-    def is_moved(self) -> bool:
-        """The end is another point on a mesh with points where conditions switch."""
-        return self.trial.settled is not self.trial
-
     def passes(self, test: Event) -> bool:
         """Return whether there is a zero of a test function by its values at both ends."""
         return test.passed(self.before.value(test), self.trial.value(test))

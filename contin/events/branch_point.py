@@ -1,6 +1,4 @@
-"""The bordered matrix that is regular at a simple branch point, and the point that it locates.
-
-The bordered matrix that is regular at a simple branch point, and what its solutions say (Griewank & Reddien 1984).
+"""The bordered matrix that is regular at a simple branch point, and the point that it locates (Griewank & Reddien 1984).
 
 At a simple branch point F_x, of shape (N, N + 1), has a two-dimensional kernel. One column psi and two rows Phi make the matrix
 regular:
@@ -13,11 +11,10 @@ Its solutions M [v_i; g_i] = [0; e_i] are the kernel, and two numbers g that van
 Lyapunov-Schmidt reduction makes this plain: on the manifold F(x) + beta psi = 0, g is the gradient of the scalar beta over the
 coordinates s. The branch point is where the gradient vanishes, and the Hessian of beta is the algebraic bifurcation equation.
 
-Branch points: located through their own regular equations, with the tangents of all branches that meet there.
-
-Newton's method for F + beta psi = 0 together with grad beta = 0: linearize with the borders; one
-update solves the first equations, one along the kernel, by the Hessian, brings the gradient to zero. Between new Hessians
-the change of the gradient updates it (Broyden's rule).
+Branch points are located through their own regular equations, with the tangents of all branches that meet there: by Newton's
+method for F + beta psi = 0 together with grad beta = 0. Linearize with the borders; one update solves the first equations, one
+along the kernel, by the Hessian, brings the gradient to zero. Between new Hessians the change of the gradient updates it
+(Broyden's rule).
 """
 
 from __future__ import annotations
@@ -188,15 +185,28 @@ class BranchPoint(Finding):
     def round_off(self, system: Discretization, newton: Newton) -> Array:
         """Return by how much free parameters change by round-off, shape (free parameters,).
 
+        That is seen by further Newton steps, which lead nowhere. Each begins where the one before ended, rounded once more:
+        round-off of all residuals is drawn anew.
+
         Examples
         --------
         >>> from contin import AlgebraicProblem
         >>> from contin.lowlevel import Algebraic
-        >>> system = Algebraic(AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0}), ["a"])
-        >>> bool(locate_branch_point(system, np.array([0.1, 0.1])).round_off(system, Newton()).max() < 1e-12)
+        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2 - 1),), ["x"], {"a": 1.0})
+        >>> system = Algebraic(pitchfork, ["a"])
+        >>> bool(locate_branch_point(system, np.array([0.1, 1.1])).round_off(system, Newton()).max() < 1e-15)
         True
         """
-        return rounded_off(system, self, newton)[system.state_size :]
+        random, noise = generator("branch point"), np.zeros_like(self.x)
+        with np.errstate(all="ignore"):
+            search = _Search(system, self.x, newton, self.kernel)
+            for _ in range(draws.DRAWS):
+                search.x = before = draws.rounded(random, search.x)
+                if not search.advance():
+                    break
+                noise = np.maximum(noise, np.abs(search.x - before))
+                search.forget()
+        return noise[system.state_size :]
 
     @property
     def leaving(self) -> tuple[Array, ...]:
@@ -284,33 +294,6 @@ def locate_branch_point(
                 return search.result()
             search.prepare()
     raise ConvergenceError(f"no branch point near by (last update {search.before:.1e})")
-
-
-def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> Array:
-    """Return by how much round-off moves each unknown of a branch point: by further Newton steps, which lead nowhere.
-
-    Each begins where the one before ended, rounded once more: round-off of all residuals is drawn anew.
-
-    Examples
-    --------
-    >>> from contin import AlgebraicProblem
-    >>> from contin.lowlevel import Algebraic
-    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2 - 1),), ["x"], {"a": 1.0})
-    >>> system = Algebraic(pitchfork, ["a"])
-    >>> found = locate_branch_point(system, np.array([0.1, 1.1]))
-    >>> bool(np.all(rounded_off(system, found, Newton()) < 1e-15))
-    True
-    """
-    random, noise = draws.generator("branch point"), np.zeros_like(point.x)
-    with np.errstate(all="ignore"):
-        search = _Search(system, point.x, newton, point.kernel)
-        for _ in range(draws.DRAWS):
-            search.x = before = draws.rounded(random, search.x)
-            if not search.advance():
-                break
-            noise = np.maximum(noise, np.abs(search.x - before))
-            search.forget()
-    return noise
 
 
 class _Search:

@@ -69,7 +69,9 @@ class BranchPointSearch:
                 return 0, True
         watched = is_watched(before.factors, trial.factors, size)
         if watched and not self._sign_changes:
-            along = quotients_along(functools.cache(self._whole))
+            along = quotients_along(
+                functools.cache(lambda part: trial.factors if part == 1 else self._bordered(part, row[None]))
+            )
             if along is not None and crossings(along) == (0, True):
                 return 0, True
         if watched and self._without_smallest is not None:
@@ -132,21 +134,11 @@ class BranchPointSearch:
                 return 0, True
         return None
 
-    def _whole(self, part: float) -> Factors:
-        """Return the factors of [F_x; row] at a part of the step."""
-        trial, row = self.arc.trial, self.arc.state.row
-        return trial.factors if part == 1 else self._bordered(part, row[None])
-
     def _bordered(self, part: float, rows: Array, columns: Array | tuple[()] = ()) -> Factors:
         """Return the factors of F_x with these rows and columns at a part of the step, inside it on the cubic."""
         arc, ends = self.arc, {0.0: self.arc.before, 1.0: self.arc.trial}
         x = ends[part].x if part in ends else arc.guess(arc.low + part * (arc.step - arc.low))
         return arc.state.system.linearize(x, rows, columns)[1]
-
-    @property
-    def _gap(self) -> float:
-        """Largest distance between two arms of a curve that count as branches which cross."""
-        return _GAP if self.arc.state.system.intervals else _GAP_WITHOUT_MESH
 
     @property
     def _says_sign(self) -> bool:
@@ -177,14 +169,14 @@ class BranchPointSearch:
         """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
         arc = self.arc
         state, trial, step = arc.state, arc.trial, arc.step
-        low, high = arc.low, step
+        low, high, largest = arc.low, step, _GAP if state.system.intervals else _GAP_WITHOUT_MESH
         middle = low + self._share * (high - low)
         for _ in range(_HALVINGS):
             try:
                 found = locate_branch_point(state.system, arc.guess(middle), arc.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = arc.low - APART * step <= at <= step * (1 + APART)
-                if inside and found.gap < self._gap and arc.passes_by(found.x, at):
+                if inside and found.gap < largest and arc.passes_by(found.x, at):
                     found = found.along(state.system, arc.direction(at))
                     return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

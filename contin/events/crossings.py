@@ -68,15 +68,10 @@ _GLANCES = 2
 
 
 def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
-    """Return how the singular values that change most do so between two points, from factors there: shape (watched,), complex.
+    """Return how the singular values that change most do so between two points, from the factors of [F_x; row] there.
 
-    - ``before``, ``after`` (Factors): Of [F_x; row] with one row.
-    - ``size`` (int): Of the matrix.
-
-    Returns
-    -------
-    ndarray
-        Eigenvalues of the quotient; NaN where a matrix is exactly singular, or where too many change.
+    They are eigenvalues of the quotient of the matrices (size, size), shape (watched,), complex; NaN where a matrix is exactly
+    singular, or where too many change.
     """
     condensed = _condensed(before, after)
     found = np.full(1, np.nan, dtype=complex) if condensed is None else _finite_eigenvalues(condensed)
@@ -92,12 +87,8 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
 def quotients_along(factors: Callable[[float], Factors]) -> ComplexArray | None:
     """Return how singular values change from each of some places of a step to the next, where condensed matrices decide.
 
-    - ``factors`` (callable): Returns those of [F_x; row] at a part of the step, from 0 to 1.
-
-    Returns
-    -------
-    ndarray or None
-        Eigenvalues of the quotients; NaN where relations turn too much, None where matrices are not condensed.
+    They are eigenvalues of the quotients, NaN where relations turn too much; None where matrices are not condensed.
+    ``factors`` returns those of [F_x; row] at a part of the step, from 0 to 1.
     """
     if not _is_condensed(factors(1.0)):
         return None
@@ -219,7 +210,7 @@ class _Watch:
             missed = last.real - 2 * (values.conj() * mixed).real + sizes**2 * first.real
             changes = _KEPT**2 * last.real - 2 * _KEPT * mixed.real + first.real
             converged = missed < (_CONVERGED * (np.sqrt(last.real) + sizes * np.sqrt(first.real))) ** 2
-            steady = converged & _is_steady(values)
+            steady = converged & (values.real > 1 / _STEADY) & (sizes < _STEADY)  # those stay about as they are
             if not np.any(steady):
                 return None
             decided = changes >= changes[steady].max()
@@ -237,11 +228,6 @@ def _eigenvalues(earlier: Array, later: Array) -> tuple[ComplexArray, ComplexArr
         except np.linalg.LinAlgError:
             pass
     return np.full(len(later), np.nan, dtype=complex), np.full(later.shape, np.nan, dtype=complex)
-
-
-def _is_steady(values: ComplexArray) -> Mask:
-    """Return which of the singular values stay about as they are."""
-    return (values.real > 1 / _STEADY) & (np.abs(values) < _STEADY)
 
 
 def calm(before: Factors, after: Factors, size: int) -> bool:

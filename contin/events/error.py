@@ -31,39 +31,24 @@ _FINER = 1.5
 
 
 class Solution(Protocol):
-    """What is asked of a point; `contin.Point` has it."""
+    """What is asked of a point, as `contin.Point` documents it."""
 
     @property
-    def system(self) -> Discretization:
-        """The discretized problem."""
-
+    def system(self) -> Discretization: ...
     @property
-    def x(self) -> Array:
-        """The unknowns, shape (size,)."""
-
+    def x(self) -> Array: ...
     @property
-    def tangent(self) -> Array:
-        """The unit tangent; NaN where it is not known."""
-
+    def tangent(self) -> Array: ...
     @property
-    def label(self) -> str:
-        """The label of a special point."""
-
+    def label(self) -> str: ...
     @property
-    def column(self) -> str:
-        """What turns at a fold."""
-
+    def column(self) -> str: ...
     @property
-    def details(self) -> Any:
-        """What the location has found."""
-
+    def details(self) -> Any: ...
     @property
-    def errors(self) -> Mapping[str, float]:
-        """Errors of the free parameters at a located point."""
-
+    def errors(self) -> Mapping[str, float]: ...
     @property
-    def newton_error(self) -> float:
-        """What Newton's method left, relative to 1 + |x|."""
+    def newton_error(self) -> float: ...
 
 
 #: A number, or numbers (k,), of a solution.
@@ -91,19 +76,11 @@ def error(point: Solution, functional: Functional, apart: Apart = lambda a, b: n
     here = np.asarray(functional(Trial.without_tangent(point.system, point.x)))
     left = (point.newton_error + LAST_PLACES) * (1 + np.abs(here))
     try:
-        change = _of_mesh(point, functional, here, apart)
+        system, carry = point.system.refined() or (point.system, np.array)
+        change = _FINER * apart(np.asarray(functional(Trial.without_tangent(system, _again(point, system, carry)))), here)
     except ConvergenceError:
         return np.full(here.shape, np.nan)
     return np.asarray(change + _of_place(point, functional, here, apart) + left)
-
-
-def _of_mesh(point: Solution, functional: Functional, here: Array, apart: Apart) -> Any:
-    """Return what halving the mesh changes or, without one, finding the point once more.
-
-    Raises ConvergenceError where the point is not found there.
-    """
-    system, carry = point.system.refined() or (point.system, np.array)
-    return _FINER * apart(np.asarray(functional(Trial.without_tangent(system, _again(point, system, carry)))), here)
 
 
 def _again(point: Solution, system: Discretization, carry: Carrier) -> Array:

@@ -1,13 +1,9 @@
 """Folds inside a step: places where the primary parameter turns, by more than the error of the discretization.
 
-The sense in which the primary parameter goes along a branch, where that is more than an error of the discretization.
-
 In a canard explosion a parameter stays within 1e-10 or less over many steps, while its rate on the mesh is 1e-11 with an
 arbitrary sign: that of the error of the mesh. A rate that small is compared with the one on a finer mesh or, without a mesh,
 with round-off. Where they differ, or where it is no more than that, the parameter stands still as far as can be told, and no
 fold is seen there. A fold lies on such a plateau if the parameter leaves it in the other sense than the one it came in.
-
-Folds inside a step: places where the primary parameter turns.
 
 The rate r of the primary parameter along the step vanishes at a fold. One fold changes its sign from one end of the step to the
 other; two folds leave it as it was, and show as a dip of r between the ends. From its values at both ends and its mean, which
@@ -48,28 +44,25 @@ STILL = ROUND_OFF / (1 + _AGREES)
 
 def sense(trial: Trial, fold: Event, newton: Newton) -> float:
     """Return the sign of the primary parameter's rate at a trial, computed once; zero where it is not significant."""
-    return trial.value(_sense_function(fold, newton))
+    return trial.value(_sense(fold, newton))
 
 
 @functools.lru_cache(maxsize=8)
-def _sense_function(fold: Event, newton: Newton) -> Event:
-    return Event(fold.label, f"sense of {fold.name}", lambda trial: _sense(trial, fold, newton))
+def _sense(fold: Event, newton: Newton) -> Event:
+    def is_significant(trial: Trial, rate: float) -> bool:
+        if not abs(rate) < CLEAR:
+            return True
+        if not trial.system.intervals:  # without a mesh, there is round-off only
+            return abs(rate) > _noise(trial, fold)
+        finer = on_finer_mesh(trial, newton) if abs(rate) > STILL else None
+        again = 0.0 if finer is None else finer.value(fold)
+        return abs(again) > ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
 
+    def function(trial: Trial) -> float:
+        rate = trial.value(fold)
+        return float(np.sign(rate)) if is_significant(trial, rate) else 0.0
 
-def _sense(trial: Trial, fold: Event, newton: Newton) -> float:
-    rate = trial.value(fold)
-    if not abs(rate) < CLEAR:
-        return float(np.sign(rate))
-    if not trial.system.intervals:  # without a mesh, there is round-off only
-        return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
-    if not abs(rate) > STILL:
-        return 0.0
-    finer = on_finer_mesh(trial, newton)
-    if finer is None:
-        return 0.0
-    again = finer.value(fold)
-    significant = abs(again) > ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
-    return float(np.sign(rate)) if significant else 0.0
+    return Event(fold.label, f"sense of {fold.name}", function)
 
 
 def _noise(trial: Trial, fold: Event) -> float:
@@ -143,14 +136,10 @@ def passed_before(arc: Arc, fold: Event) -> list[SpecialPoint]:
     at = state.system.parameter_index(fold.name)
     gone = arc.trial.x[at] - state.x[at]
     moved = gone * behind > STANDS * (1 + abs(state.x[at]))
-    return [_behind_plateau(arc, fold)] if moved and state.sense * behind < 0 and state.sensed is not None else []
-
-
-def _behind_plateau(arc: Arc, fold: Event) -> SpecialPoint:
-    """Return the beginning of a step as a fold; its errors are the way since the parameter's sense was told last."""
-    assert arc.state.sensed is not None
-    errors = dict(zip(arc.state.system.free, map(float, np.abs(free_values(arc.trial) - arc.state.sensed))))
-    return SpecialPoint(0.0, fold.label, fold.name, arc.before, test=fold, errors=errors)
+    if not moved or state.sense * behind >= 0 or state.sensed is None:
+        return []
+    errors = dict(zip(state.system.free, map(float, np.abs(free_values(arc.trial) - state.sensed))))
+    return [SpecialPoint(0.0, fold.label, fold.name, arc.before, test=fold, errors=errors)]
 
 
 def free_values(trial: Trial) -> Array:
@@ -319,29 +308,17 @@ class FoldSearch:
 
         Where the parameter stands still and goes on, as at a hysteresis point, signs are round-off.
         """
-        parabola = self._parabola(left, right)
-        first, last = parabola[:2].tolist()
+        parabola, (a, b) = self._parabola(left, right), (left[0], right[0])
+        sign = math.copysign(1.0, parabola[0] or parabola[1])
+        first, last, linear, square = (sign * parabola).tolist()  # positive at both ends
         if not (first or last):
             return None
-        sign = math.copysign(1.0, first or last)
-        at, square = self._suspect(left, right, sign * parabola)
-        if at is None:
+        if dips(first, last, linear, square):
+            at = a - (b - a) * linear / (2 * square)  # the vertex
+        elif ends_low(first, last, linear, square):
+            at = a if first < last else b
+        else:
             return None
-        flat = LAST_PLACES * max(abs(first), abs(last))
-        found = followed(self._place, lambda trial: sign * self.rate(trial), (at, square), (left[0], right[0]), flat)
+        dip, flat = (at, square / (b - a) ** 2), LAST_PLACES * max(abs(first), abs(last))
+        found = followed(lambda s: (s, self.arc.at(s)), lambda trial: sign * self.rate(trial), dip, (a, b), flat)
         return found if found is not None and sense(found[1], self.fold, self.arc.newton) else None
-
-    def _place(self, s: float) -> Place:
-        return s, self.arc.at(s)
-
-    def _suspect(self, left: Place, right: Place, parabola: Array) -> tuple[float | None, float]:
-        """Return a place between two where the rate could come near zero, or None, and half its second derivative.
-
-        That is the vertex of the parabola, which is positive at both ends. Where it lies outside, but the rate at one end is
-        close to zero already: that end.
-        """
-        a, width = left[0], right[0] - left[0]
-        first, last, linear, square = parabola.tolist()
-        if dips(*parabola):
-            return a - width * linear / (2 * square), square / width**2
-        return (left if first < last else right)[0] if ends_low(*parabola) else None, square / width**2

@@ -67,7 +67,7 @@ class Watch:
         if any(test.label == Label.GRAZING for test in tests):
             self._doubts.append(_lost_grazing)
         if settings.mesh.every:
-            self._asks.append(lambda inspection: inspection.arc.is_moved)
+            self._asks.append(lambda inspection: inspection.arc.trial.settled is not inspection.arc.trial)
             self._doubts.append(_moved_past(general, fold, settings))
         if fold is not None:
             self._asks.append(lambda inspection: may_turn(inspection.arc, fold))
