@@ -91,8 +91,14 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     if not any(moves):
         return []
     if arc.trial.system.size <= SMALL:  # otherwise each place takes long
-        looked, moves = _looked_at_closely(arc, looked, moves, unclear)
-    passed = _passed(looked, moves)
+        for _ in range(_CLOSER):  # where two pairs nearly meet, real parts have narrow peaks: one may pass and come back
+            between = [(a[0] + b[0]) / 2 for (a, b), doubtful in zip(itertools.pairwise(looked), unclear) if doubtful]
+            if not between:
+                break
+            looked = sorted([*looked, *((s, arc.guessed(s)) for s in between)], key=lambda knot: knot[0])
+            moves, unclear = _moving(looked)
+    pieces = zip(itertools.pairwise(looked), moves)  # none passes where eigenvalues do not move so far
+    passed = [(left[0], right[0]) for (left, right), far in pieces if far and _passes_as_pair(left[1], right[1])]
     if len(passed) > 1 or (passed and not any(_passes_as_pair(a[1], b[1]) for a, b in itertools.pairwise(knots))):
         inside = sorted({*inside, *(s for pair in passed for s in pair)} - {s for s, _ in knots})
         knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda knot: knot[0])
@@ -112,27 +118,6 @@ def _moving(places: list[Place]) -> tuple[list[bool], list[bool]]:
     moves = moves_of(range(count), along.shape[1])
     find_moves(along.real.copy(), along.imag.copy(), np.array([s for s, _ in places]), moves)
     return moves.passes.astype(bool).tolist(), moves.unclear.astype(bool).tolist()
-
-
-def _looked_at_closely(arc: Arc, places: list[Place], moves: list[bool], unclear: list[bool]) -> tuple[list[Place], list[bool]]:
-    """Return the places and, where it is not clear what passes between two of them, further ones between these, on the cubic.
-
-    A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks. ``moves`` tells
-    where eigenvalues move far, and comes back for the new places.
-    """
-    for _ in range(_CLOSER):
-        between = [(left[0] + right[0]) / 2 for (left, right), doubtful in zip(itertools.pairwise(places), unclear) if doubtful]
-        if not between:
-            break
-        places = sorted([*places, *((s, arc.guessed(s)) for s in between)], key=lambda place: place[0])
-        moves, unclear = _moving(places)
-    return places, moves
-
-
-def _passed(places: list[Place], moves: list[bool]) -> list[tuple[float, float]]:
-    """Return neighbours among places of a step between which a pair passes: none where eigenvalues do not move so far."""
-    pieces = zip(itertools.pairwise(places), moves)
-    return [(left[0], right[0]) for (left, right), far in pieces if far and _passes_as_pair(left[1], right[1])]
 
 
 def _passes_as_pair(left: Trial, right: Trial) -> bool:
@@ -195,7 +180,7 @@ def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoi
     if np.all(one == other):
         located = [_located(arc, left, right, both) for both in zip(first[one > 0], last[one > 0])]
         found = [point for point in located if point is not None]
-        if all(_pairs_at(point) >= _count_at(point, found, arc) for point in found):
+        if all(_pairs_at(here) >= sum(abs(here.at - other.at) <= DOUBLED * arc.step for other in found) for here in found):
             return found
     if depth == _CUTS:
         return []
@@ -257,11 +242,6 @@ def _pairs_at(point: SpecialPoint) -> int:
     """Return how many pairs lie on the imaginary axis at a Hopf point."""
     values = _upper(point.trial)
     return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < DOUBLED * (1 + np.abs(values)))))
-
-
-def _count_at(point: SpecialPoint, found: list[SpecialPoint], arc: Arc) -> int:
-    """Return how many of the points found lie at the place of one of them."""
-    return sum(abs(point.at - other.at) <= DOUBLED * arc.step for other in found)
 
 
 def _joined(found: list[SpecialPoint], arc: Arc) -> list[SpecialPoint]:

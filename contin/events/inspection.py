@@ -177,7 +177,9 @@ class Inspection:
             if points is not None:
                 return points
         state = self.arc.state
-        same = [point for point in (*self.folds, *crossings) if self._coincides(test, point)]
+        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
+        known = [point for point in (*self.folds, *crossings) if point.is_located and not self._at_the_start(point)]
+        same = [point for point in known if abs(point.trial.value(test)) <= DEPENDENT * largest]
         found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
         for left, right in self._pieces(test, same):
             before, after = left[1].value(test), right[1].value(test)
@@ -186,26 +188,15 @@ class Inspection:
             if not test.passed(before, after):
                 continue
             point = self.arc.locate(test, left, right)
-            if not point.is_located and (special := self._nearly(test, crossings)) is not None:
-                point = self._at_special(test, special)
+            if not point.is_located:  # beside a branch point at which it vanishes up to the discretization
+                near = (special for special in crossings if abs(special.trial.value(test)) <= APART * largest)
+                point = next((self._at_special(test, special) for special in near), point)
             again = any(abs(point.at - other.at) < ROUGH * self.arc.step for other in same)
             if not again and (test.confirm is None or test.confirm(point.trial)):
                 found.append(point)
             if test.terminal:
                 break
         return found
-
-    def _coincides(self, test: Event, point: SpecialPoint) -> bool:
-        """Return whether a test function vanishes at a special point of the step."""
-        if self._at_the_start(point) or not point.is_located:
-            return False
-        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
-        return bool(abs(point.trial.value(test)) <= DEPENDENT * largest)
-
-    def _nearly(self, test: Event, crossings: list[SpecialPoint]) -> SpecialPoint | None:
-        """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
-        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
-        return next((point for point in crossings if abs(point.trial.value(test)) <= APART * largest), None)
 
     def _at_special(self, test: Event, point: SpecialPoint) -> SpecialPoint:
         """Return the zero of a test function that lies at a special point."""

@@ -56,11 +56,6 @@ class Window:
         """Chebyshev nodes, as distances along the tangent."""
         return np.asarray(self.middle + self.width * np.sort(chebyshev.chebpts1(self.count)), dtype=float)
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Ends of the interval."""
-        return self.middle - self.width, self.middle + self.width
-
 
 @dataclass(frozen=True, eq=False)
 class InterpolatedZero(Finding):
@@ -83,20 +78,16 @@ class InterpolatedZero(Finding):
     newton_error: float
     has_equations: ClassVar[bool] = True
 
-    @property
-    def noise(self) -> Array:
-        """By how much the unknowns of the nearest of the points change by round-off, shape (size,)."""
-        nearest, system = int(np.abs(self.window.places - self.at).argmin()), self.trial.system
-        return rounded_off(system, self.points[nearest], (system.weights * self.window.state.tangent,))
-
     def there(self, system: Discretization, tangent: Array) -> Trial:
         """Return the point, with the tangent of the polynomial."""
         return self.trial
 
     def split(self, system: Discretization) -> Array:
         """Return the error that Newton's method, or round-off, has left of the points around it."""
-        left = self.newton_error * (1 + np.abs(self.trial.x[system.state_size :]))
-        return np.maximum(left, self.noise[system.state_size :])
+        left, own = self.newton_error * (1 + np.abs(self.trial.x[system.state_size :])), self.trial.system
+        nearest = self.points[int(np.abs(self.window.places - self.at).argmin())]
+        noise = rounded_off(own, nearest, (own.weights * self.window.state.tangent,))
+        return np.maximum(left, noise[system.state_size :])
 
     def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.

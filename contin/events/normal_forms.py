@@ -1,6 +1,6 @@
 """Normal forms of folds, Hopf points and others, with the errors of their coefficients.
 
-Normal forms of equilibria, of cycles and of cycles of maps (Kuznetsov, Elements of Applied Bifurcation Theory).
+They are those of equilibria, cycles and cycles of maps (Kuznetsov, Elements of Applied Bifurcation Theory).
 
 Perturbations that are multiplied by exp(rate t), or in a round by mu = exp(rate), are the null vectors of a characteristic
 matrix L(rate). With the forms B and C, the derivatives of second and third order, a coordinate xi of the centre manifold obeys
@@ -81,10 +81,6 @@ class Coefficient:
             return float(CERTAIN * draws.spread("coefficient", change) + of_derivatives * size)
 
         return cls(value, size, estimate)
-
-    def is_meaningless(self, error: float) -> bool:
-        """Return whether an error is as large as the terms, and not just round-off of terms that are zero."""
-        return not (error < self.size or error < LOCATED)
 
     def signed(self, known: float) -> float:
         """Return the value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations.
@@ -252,10 +248,6 @@ class DenseForm(Form):
     def length(self, right: Numbers) -> float:
         """Return the length of v."""
         return float(np.linalg.norm(right[: self._count]))
-
-
-#: Terms of a coefficient.
-Terms = Callable[[Form], Numbers]
 
 
 def fold(form: Form) -> Numbers:

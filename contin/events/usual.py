@@ -25,7 +25,6 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.differences import derivative
 from contin.core.labels import Label
-from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.draws import generator
@@ -33,7 +32,7 @@ from contin.errors import ProblemError
 from contin.events import normal_forms
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.normal_forms import Coefficient
-from contin.levels import APART
+from contin.levels import APART, LOCATED
 from contin.linalg.border import orthonormal, rows_fit
 from contin.text import value_names
 
@@ -61,11 +60,8 @@ def limits(intervals: Mapping[str, Sequence[float]]) -> list[Event]:
 
 def _limit(name: str, value: float, text: str, side: int) -> Event:
     """Return the one of the upper (``side`` +1) or lower (-1) end."""
-
-    def function(trial: Trial) -> float:
-        return side * (trial[name] - value)
-
-    return Event(Label.END, f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
+    given: Any = {"terminal": True, "limit": True, "column": name, "value": value}
+    return Event(Label.END, f"{name} = {text}", lambda trial: side * (trial[name] - value), **given)
 
 
 def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
@@ -103,7 +99,8 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
         return dataclasses.replace(point, name=f"{point.name}, not smooth")
     unknown = not errors and found.is_certain
     error = 0.0 if unknown else found.error + abs(found.value - coarse.value)
-    value = {} if found.is_meaningless(error) else {"normal_form": found.value}
+    means = error < found.size or error < LOCATED  # it is less than the terms, or round-off of terms that are zero
+    value = {"normal_form": found.value} if means else {}
     details = {**(point.details or {}), **value, **({} if unknown else {"normal_form_error": error})}
     attracts, repels = found.side * found.value < -error, found.side * found.value > error
     is_fold = point.test is not None and point.test.normal_form is normal_forms.fold
@@ -138,18 +135,18 @@ class Stationarity:
         self.residual, self.factors = system.linearize(x, rows)
         self.solutions = self.factors.solve(np.eye(len(rows), system.size, system.equations))
         self.kernel: Array = self.solutions[len(held) :]
-        solution = self.factors.solve_transposed(gradient_of(system, x, column))
+        gradient = system.column_gradient(x, column)
+        if gradient is None:
+            raise ProblemError(f"start: extrema of {column!r} are labelled on branches, but not followed: it is no integral")
+        solution = self.factors.solve_transposed(gradient)
         self.multipliers: Array = solution[: system.equations]
         self.by_held: Array = solution[system.equations : system.size - count]
         self.g: Array = solution[system.size - count :]
 
     def gradients(self) -> Array:
-        """Return dg/dx, shape (j, size)."""
-        return np.array([self._bent(v) for v in self.kernel])
-
-    def _bent(self, v: Array) -> Array:
-        """Return the derivative of G_x - F_x^T lambda along v, shape (size,)."""
-        return self._system.column_bent(self._x, self._column, v) - self._system.bent(self._x, self.multipliers, v)
+        """Return dg/dx, shape (j, size): the derivatives of G_x - F_x^T lambda along V."""
+        system, x = self._system, self._x
+        return np.array([system.column_bent(x, self._column, v) - system.bent(x, self.multipliers, v) for v in self.kernel])
 
     @property
     def fits(self) -> bool:
@@ -167,46 +164,31 @@ class Stationarity:
         return np.asarray(np.linalg.eigvalsh((hessian + hessian.T) / 2), dtype=float)
 
 
-def gradient_of(system: System, x: Array, column: str) -> Array:
-    """Return the derivatives of a column by x; raise ProblemError where they are not known."""
-    found = system.column_gradient(x, column)
-    if found is None:
-        raise ProblemError(f"start: extrema of {column!r} are labelled on branches, but not followed: it is no integral")
-    return found
-
-
 def extremum(column: str) -> Event:
     """Return the test function of extrema of a column along a curve: its derivative along the tangent."""
 
     def slope(trial: Trial) -> float:
-        gradient = trial.system.column_gradient(trial.x, column)
-        return _difference(trial, column) if gradient is None else float(gradient @ trial.tangent)
+        system, x, tangent = trial.system, trial.x, trial.tangent
+        gradient = system.column_gradient(x, column)
+        if gradient is None:
+            return float(derivative(lambda s: Trial(system, x + s * tangent, trial.linear)[column])[0])
+        return float(gradient @ tangent)
 
     return Event(Label.EXTREMUM, column, slope, describe=lambda trial: curvatures(trial, column), column=column)
 
 
-def _difference(trial: Trial, column: str) -> float:
-    """Return the derivative of a column along the tangent by differences: it has none that is known."""
-    tangent = trial.tangent
-    return float(derivative(lambda s: Trial(trial.system, trial.x + s * tangent, trial.linear)[column])[0])
-
-
 def curvatures(trial: Trial, column: str) -> dict[str, float] | None:
-    """Return the least and the largest second derivative at an extremum; None where first ones are not known."""
-    base, x = solutions_of(trial.system, trial.x, column)
-    if base is None or base.column_gradient(x, column) is None:
-        return None
-    values = Stationarity(base, x, column).curvatures()
-    return {"least_curvature": float(values[0]), "largest_curvature": float(values[-1])}
+    """Return the least and the largest second derivative at an extremum; None where first ones are not known.
 
-
-def solutions_of(system: Discretization, x: Array, column: str) -> tuple[System | None, Array]:
-    """Return the system whose solutions an extremum of a column is compared with, and its unknowns.
-
-    On a branch, that is its own system; on a curve of extrema of the same column, the underlying one, with all its free
-    parameters. None on other curves.
+    An extremum is compared with solutions of its own system; on a curve of extrema of the same column with those of the
+    underlying one, with all its free parameters. None on other curves.
     """
-    curve: Any = system
-    if not system.on_curve:
-        return curve, x
-    return (curve.base, x[: curve.base.size]) if curve.objective == column else (None, x)
+    system, x = trial.system, trial.x
+    if system.on_curve and system.objective != column:
+        return None
+    if system.on_curve:
+        system, x = system.base, x[: system.base.size]
+    if system.column_gradient(x, column) is None:
+        return None
+    values = Stationarity(system, x, column).curvatures()
+    return {"least_curvature": float(values[0]), "largest_curvature": float(values[-1])}

@@ -51,8 +51,9 @@ class Watch:
         #: Those of the equations, which are singular where a kind of problem knows its branch to end, and others.
         self._of_equations: list[Doubts] = [_unclear] if settings.branch_points else []
         self._doubts: list[Doubts] = []
-        homes: list[Callable[[Inspection], SpecialPoint | None]] = [] if shrinks is None else [_own_home]
+        homes: list[Callable[[Inspection], SpecialPoint | None]] = []
         if shrinks is not None:
+            homes.append(lambda inspection: inspection.arc.trial.system.home(inspection.arc))  # the kind of problem knows it
             self._asks.append(_sign(shrinks))
         if settings.trivial is not None:
             homes.append(Inspection.trivial_end)
@@ -156,12 +157,6 @@ def _changed(index: Event) -> Asks:
 # --- who doubts --------------------------------------------------------------------------------------------------------
 
 
-def _own_home(inspection: Inspection) -> SpecialPoint | None:
-    """The end of the branch that the kind of problem knows."""
-    home: SpecialPoint | None = inspection.arc.trial.system.home(inspection.arc)
-    return home
-
-
 def _unclear(inspection: Inspection) -> str:
     _, clear = inspection.branch_points.count
     return "" if clear else "the linearized equations come close to singular: branch points may have been passed"
@@ -169,12 +164,8 @@ def _unclear(inspection: Inspection) -> str:
 
 def _lost_home(trivial: str) -> Doubts:
     """A change of sign of the trivial quantity without a zero on the branch means that Newton's method left the branch."""
-
-    def doubt(inspection: Inspection) -> str:
-        lost = inspection.home is not None and not inspection.home.is_located
-        return f"{trivial} changes its sign, and no zero of it was found on the branch" if lost else ""
-
-    return doubt
+    clause = f"{trivial} changes its sign, and no zero of it was found on the branch"
+    return lambda inspection: "" if inspection.home is None or inspection.home.is_located else clause
 
 
 def _lost_branch_point(inspection: Inspection) -> str:
