@@ -91,12 +91,8 @@ def check_lattice(matrix: Array, names: Sequence[str], angles: Mapping[str, floa
 
 def image(matrix: Sequence[Sequence[float]], u: Sequence[Any]) -> list[Any]:
     """Return the product of a matrix, as a list of rows, and a vector; zeros and ones are not multiplied."""
-    return [_product(row, u) for row in matrix]
-
-
-def _product(row: Sequence[float], u: Sequence[Any]) -> Any:
-    terms = [value if factor == 1 else factor * value for factor, value in zip(row, u) if factor]
-    return sum(terms[1:], terms[0])
+    terms = [[value if factor == 1 else factor * value for factor, value in zip(row, u) if factor] for row in matrix]
+    return [sum(each[1:], each[0]) for each in terms]
 
 
 def averaged(function: Function, matrix: Array, names: Sequence[str], order: int) -> Function:
@@ -221,8 +217,12 @@ class CycleProblem(BoundaryValueProblem):
         signature = Signature(names, tuple(parameters), times=forced)
         field = returning(field, signature)
         check_field(field, signature, _FORCED if forced else _AUTONOMOUS)
-        field, kept_mass = _with_mass(field, mass, names, forced)
-        turn = _turn(symmetry, forced, len(names))
+        kept_mass = None if mass is None else Mass.of(mass, names)
+        if kept_mass is not None and kept_mass.is_regular:
+            field, kept_mass = kept_mass.rates_of(field, 2 + forced), None
+        if forced and symmetry is not None:
+            raise ProblemError("symmetry: must be left out where a period is given; only autonomous fields may have one")
+        turn = np.eye(len(names)) if symmetry is None else symmetry_matrix(symmetry, len(names))
         check_equivariance(field, turn, names, parameters)
         check_lattice(turn, names, periods)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
@@ -241,13 +241,17 @@ class CycleProblem(BoundaryValueProblem):
         """The period, of an autonomous field."""
         return PERIOD if self.period is None else ""
 
+    @property
+    def _given(self) -> dict[str, float]:
+        """The parameters that the user has stated."""
+        own = (PERIOD if self.period is None else ROUNDS, *winding_names(self.angles))
+        return {name: value for name, value in self.parameters.items() if name not in own}
+
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
-        states, own = self.state_names, (PERIOD, ROUNDS, *winding_names(self.angles))
-        parameters = tuple(name for name in self.parameters if name not in own)
-        of_field = Signature(states, parameters, times=self.period is not None).arguments
-        of_means = Signature(states, tuple(self.parameters), times=self.period is not None).arguments
-        return {"field": of_field, "functionals": of_means, "period": [parameters]}
+        stated, every = tuple(self._given), tuple(self.parameters)
+        of_field, of_means = (Signature(self.state_names, p, times=self.period is not None).arguments for p in (stated, every))
+        return {"field": of_field, "functionals": of_means, "period": [stated]}
 
     def discretized(
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
@@ -301,11 +305,15 @@ class CycleProblem(BoundaryValueProblem):
     @functools.cached_property
     def _at_rest(self) -> AlgebraicProblem:
         """The equilibria of the field; of a forced one with the time as a parameter."""
-        own, forced = (PERIOD, ROUNDS, *winding_names(self.angles)), self.period is not None
-        parameters = {name: value for name, value in self.parameters.items() if name not in own}
-        field = _at_time(self.field, tuple(parameters)) if forced else self.field
-        means, time = ({}, {_TIME: 0.0}) if forced else (self.means, {})
-        return AlgebraicProblem(field, self.state_names, {**parameters, **time}, means, angles=self.angles)
+        parameters, field = self._given, self.field
+        if self.period is None:
+            return AlgebraicProblem(field, self.state_names, parameters, self.means, angles=self.angles)
+        known = named_values(tuple(parameters))
+
+        def at_time(u: Any, p: Any) -> Any:
+            return field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in parameters)))
+
+        return AlgebraicProblem(at_time, self.state_names, {**parameters, _TIME: 0.0}, {}, angles=self.angles)
 
     def without_found(self, start: Sequence[float]) -> CycleProblem:
         """Return the same cycles without states that have no rates, which are found from a start.
@@ -318,8 +326,6 @@ class CycleProblem(BoundaryValueProblem):
         FollowedProblem(states x, v; parameters k, period)
         """
         arguments, names, mass = 2 if self.period is None else 3, self.state_names, self.mass
-        own = (PERIOD, ROUNDS, *winding_names(self.angles))
-        parameters = {name: value for name, value in self.parameters.items() if name not in own}
 
         def of_kept(function: Function) -> Function:
             return mass.of_kept(function, self.field, names, start, arguments)
@@ -333,7 +339,7 @@ class CycleProblem(BoundaryValueProblem):
         angles = {name: period for name, period in self.angles.items() if name in kept}
         rates = of_kept(mass.rates_of(self.field, arguments))
         following = [names[i] for i in mass.columns]
-        return FollowedProblem(rates, kept, parameters, means, following, period=self.period, angles=angles)
+        return FollowedProblem(rates, kept, self._given, means, following, period=self.period, angles=angles)
 
     def check_index(self, states: Array, parameters: Mapping[str, float]) -> None:
         """Check that the equations without rates determine the states that have none, at a place.
@@ -396,10 +402,9 @@ class CycleProblem(BoundaryValueProblem):
         """
         if self.order == 1:
             return self
-        own = (PERIOD, *winding_names(self.angles))
-        kept = {name: value for name, value in self.parameters.items() if name not in own}
+        given: Any = {"functionals": self.means, "angles": self.angles}
         symmetry = self.symmetry @ self.symmetry if self.order > 2 else None
-        return CycleProblem(self.field, self.state_names, kept, functionals=self.means, symmetry=symmetry, angles=self.angles)
+        return CycleProblem(self.field, self.state_names, self._given, symmetry=symmetry, **given)
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -443,15 +448,11 @@ class CycleProblem(BoundaryValueProblem):
 
     def _mean(self, function: Function) -> Function:
         """Return a functional as a function of (t, u, p) whose mean over the part computed is that over the period."""
-        if self.period is not None:
-            return _of_forcing(function, self.period)
-        return _of_time(function) if self.order == 1 else averaged(function, self.symmetry, self.state_names, self.order)
-
-
-def _at_time(field: Function, names: Sequence[str]) -> Function:
-    """Return a forced field as one whose time is a parameter."""
-    known = named_values(tuple(names))
-    return lambda u, p: field(getattr(p, _TIME), u, known(*(getattr(p, name) for name in names)))
+        if (period := self.period) is not None:
+            return lambda t, u, p: function(p.rounds * period(p) * t, u, p)
+        if self.order == 1:
+            return lambda t, u, p: function(u, p)
+        return averaged(function, self.symmetry, self.state_names, self.order)
 
 
 class FollowedProblem(CycleProblem):
@@ -471,23 +472,6 @@ class FollowedProblem(CycleProblem):
         columns[count:count] = extremes
         functions = {**self.functionals, **dict.fromkeys(extremes, found_elsewhere)}
         self._keep(following=tuple(following), functionals={name: functions[name] for name in columns})
-
-
-def _with_mass(field: Function, mass: object, names: Sequence[str], forced: bool) -> tuple[Function, Mass | None]:
-    """Return the field times the inverse of a regular mass matrix, and a singular one."""
-    if mass is None:
-        return field, None
-    found = Mass.of(mass, names)
-    return (found.rates_of(field, 2 + forced), None) if found.is_regular else (field, found)
-
-
-def _turn(symmetry: object, forced: bool, count: int) -> Array:
-    """Return the matrix of a symmetry, the identity where there is none; raises as `symmetry_matrix`."""
-    if symmetry is None:
-        return np.eye(count)
-    if forced:
-        raise ProblemError("symmetry: must be left out where a period is given; only autonomous fields may have one")
-    return symmetry_matrix(symmetry, count)
 
 
 #: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
@@ -515,20 +499,6 @@ def _periodic(turn: Array, names: Sequence[str], angles: Mapping[str, float]) ->
         return gaps
 
     return boundary
-
-
-def _of_time(function: Function) -> Function:
-    def mean(t: float, u: Named, p: Named) -> Any:
-        return function(u, p)
-
-    return mean
-
-
-def _of_forcing(function: Function, period: Function) -> Function:
-    def mean(t: float, u: Named, p: Named) -> Any:
-        return function(p.rounds * period(p) * t, u, p)
-
-    return mean
 
 
 class MapProblem(AlgebraicProblem):

@@ -322,3 +322,15 @@ def test_cycles_whose_period_changes_fast_beside_hopf_points():
     assert end["period"] == pytest.approx(2 * math.pi / last.details["frequency"], rel=1e-11)
     assert [fold["q"] for fold in cycles.labelled("LP")] == pytest.approx([1.039162965369, 1.053610280788], abs=1e-11)
     assert not cycles.notes
+
+
+def test_a_parameter_of_an_autonomous_field_may_be_called_rounds():
+    """Only forced cycles have a number of rounds. The cycle is a circle of the radius sqrt(rounds) with the period 2 pi."""
+
+    def field(u, p):
+        growth = p.rounds - u.x**2 - u.y**2
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    guess = lambda t: (0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t))  # noqa: E731
+    orbit = contin.solve(CycleProblem(field, ["x", "y"], {"rounds": 0.25}), guess, {"period": 6})
+    assert (orbit["max_x"], orbit["period"]) == (pytest.approx(0.5, abs=1e-10), pytest.approx(2 * math.pi, abs=1e-10))
