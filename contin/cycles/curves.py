@@ -1,6 +1,4 @@
-"""Curves of folds, period doublings and torus bifurcations of cycles in two parameters.
-
-Defining systems of curves of period doublings and torus bifurcations, of cycles and of cycles of maps, in two parameters.
+"""Curves of folds, period doublings and torus bifurcations of cycles, and of cycles of maps, in two parameters.
 
 A perturbation is multiplied in a round by an eigenvalue of P. It is -1 at a period doubling. At a torus bifurcation, with
 kappa = cos(theta) and the perturbation v_1 + i sin(theta) v_2,
@@ -17,7 +15,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -165,15 +162,19 @@ def _at_fold(label: str, name: str) -> Event:
 def _resonance(label: str, kappa: float) -> Event:
     """Return the test function of the angle with this cosine: a strong resonance; the curve ends where the angle is 0 or pi.
 
-    A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi and go back: `_touched`.
+    A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi, where it has an extremum,
+    and go back. A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round
+    comes to -1 and goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where
+    cycles that have an image become their own image: there the pair comes to 1, and the curve goes back on itself.
     """
     sign, name, at_end = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}", abs(kappa) == 1
+    stops = f"met {name} on a symmetric cycle: beyond it the curve is its own mirror image"
 
     def distance(trial: Trial) -> float:
         return sign * (cast(TorusCurve, trial.system).kappa(trial.x) - kappa)
 
     def search(arc: Arc, _: object) -> list[SpecialPoint] | None:
-        return _touched(arc, test, distance)
+        return meeting(arc, test, (_change, distance), _NEAR, stops)
 
     def asks(arc: Arc) -> bool:
         return arc.passes(test) or _change(arc.before) * _change(arc.trial) < 0
@@ -185,17 +186,6 @@ def _resonance(label: str, kappa: float) -> Event:
 def _change(trial: Trial) -> float:
     """Return how fast kappa changes along the curve."""
     return float(trial.tangent[-1])
-
-
-def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
-    """Return the resonance where the angle has an extremum; None where there is none in a step.
-
-    A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round comes to -1 and
-    goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where cycles that have an
-    image become their own image: there the pair comes to 1, and the curve goes back on itself.
-    """
-    stops = f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image"
-    return meeting(arc, test, (_change, distance), _NEAR, stops)
 
 
 def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:

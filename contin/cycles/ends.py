@@ -1,17 +1,14 @@
 """Ends of branches of cycles: at homoclinic orbits, where the period runs away, and at Hopf points.
 
-Cycles whose period runs away: the equilibrium near which such a cycle spends its time, and the end of its branch.
-
 Near an equilibrium a cycle is slow. On its way to a homoclinic orbit, or to a saddle-node on it, the least speed falls without
 bound; where its square is round-off, the parameter no longer tells the cycle from the homoclinic orbit, and special points of
 longer cycles mean nothing.
 
-The end of a branch of cycles that shrink onto an equilibrium, at a Hopf point.
-
-The amplitude, the projection of a cycle on an earlier one of the run, passes zero along the branch: beyond the Hopf point is
-the same branch again, half a period on. The equations of cycles are singular at the equilibrium (the period is arbitrary
-there), and their solutions are known the less exactly the smaller the cycle is. So the place is taken from the amplitude on the
-cubic through both ends of a step, and the point from its own equations, which are regular:
+Where cycles shrink onto an equilibrium, at a Hopf point, the amplitude, the projection of a cycle on an earlier one of the run,
+passes zero along the branch: beyond the Hopf point is the same branch again, half a period on. The equations of cycles are
+singular at the equilibrium (the period is arbitrary there), and their solutions are known the less exactly the smaller the
+cycle is. So the place is taken from the amplitude on the cubic through both ends of a step, and the point from its own
+equations, which are regular:
 
 1. Find the zero of the amplitude on the cubic. The cycle there, but for its mean, is left out.
 2. Find the equilibrium F(u, p) = 0 by Newton's method, for the value of the parameter.
@@ -80,13 +77,10 @@ class RestingPlace:
     def describe(self, names: tuple[str, ...]) -> str:
         """Return all that as a sentence."""
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, self.states))
-        values = ", ".join(_number(value) for value in self.eigenvalues if value.imag >= 0)
+        upper = [value for value in self.eigenvalues if value.imag >= 0]
+        values = ", ".join(f"{value.real:.6g}" + (f" +- {value.imag:.6g} i" if value.imag else "") for value in upper)
         kind = ", at a fold of equilibria" if self.fold else ""
         return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}{kind}, eigenvalues {values}"
-
-
-def _number(value: complex) -> str:
-    return f"{value.real:.6g} +- {value.imag:.6g} i" if value.imag else f"{value.real:.6g}"
 
 
 @functools.cache  # one for all runs
@@ -109,8 +103,8 @@ def _liveliness(trial: Trial) -> float:
 
 
 def is_still(trial: Trial) -> bool:
-    """Return whether a cycle cannot be told from a homoclinic orbit, so that its multipliers mean nothing."""
-    return _liveliness(trial) <= 0
+    """Return whether an autonomous cycle cannot be told from a homoclinic orbit, so that its multipliers mean nothing."""
+    return bool(trial.system.autonomous and trial.system.intervals) and _liveliness(trial) <= 0
 
 
 def _speeds(system: Any, x: Array) -> Array:
@@ -121,12 +115,7 @@ def _speeds(system: Any, x: Array) -> Array:
 def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
     """Return the equilibrium that Newton's method finds from where a cycle is slowest; None where it finds none.
 
-    Returns
-    -------
-    states : ndarray, shape (n,)
-        Divided by their sizes.
-    eigenvalues : ndarray of complex, shape (n,)
-        Those of the equilibrium, the largest real part first.
+    That is its states (n,), divided by their sizes, and its eigenvalues (n,), the largest real part first.
     """
     points = system.at_gauss_points(x)
     size = np.ptp(points, axis=0)
@@ -336,19 +325,22 @@ def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, A
 
     Raises ConvergenceError where there is none.
     """
-    n, size = len(system.problem.state_names), system.state_size
-    at, period = (
-        next(i for i in range(size, system.size) if i != system.parameter_index(PERIOD)),
-        system.parameter_index(PERIOD),
-    )
+    n, size, period = len(system.problem.state_names), system.state_size, system.parameter_index(PERIOD)
+    at = next(i for i in range(size, system.size) if i != period)
     x = guess.copy()
     states = x[:size].reshape(-1, n)
     states[:] = system.weights[:size:n] @ states
     expected = 2j * math.pi / system.order
 
     def critical(value: float) -> complex:
+        """Put the equilibrium for a value of the parameter into ``states``; return the eigenvalue nearest to the expected."""
         x[at] = value
-        return _critical(system, x, states, expected)
+        here = nearest_zero(lambda u: (system.rates(x, u[None])[0], system.rates_by_states(x, u[None])[0]), states[0])
+        if here is None:
+            raise ConvergenceError("no equilibrium is found near the cycle")
+        states[:] = here
+        values = np.linalg.eigvals(system.rates_by_states(x, here[None])[0])
+        return complex(values[np.abs(values - expected).argmin()])
 
     first = float(x[at])
     last, step = critical(first), DOUBLED * (1 + abs(first))
@@ -366,16 +358,3 @@ def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, A
     errors[at - size] = abs(step) + np.finfo(float).eps * (1 + abs(x[at]))
     errors[period - size] = np.finfo(float).eps * abs(x[period]) * (1 + abs(found))
     return x, frequency, errors
-
-
-def _critical(system: CycleCollocation, x: Array, states: Array, expected: complex) -> complex:
-    """Return the eigenvalue, nearest to an expected one, at the equilibrium that is put into ``states``, a view of x.
-
-    Raises ConvergenceError where there is none.
-    """
-    here = nearest_zero(lambda u: (system.rates(x, u[None])[0], system.rates_by_states(x, u[None])[0]), states[0])
-    if here is None:
-        raise ConvergenceError("no equilibrium is found near the cycle")
-    states[:] = here
-    values = np.linalg.eigvals(system.rates_by_states(x, here[None])[0])
-    return complex(values[np.abs(values - expected).argmin()])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import threading
 from collections.abc import Mapping, Sequence
@@ -66,7 +67,7 @@ class OfCycles(Discretization):
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None near -1."""
-        return None if is_opposite(frequency) else ("TR", "torus")
+        return None if abs(frequency - math.pi) < APART else ("TR", "torus")
 
     def unstable(self: Any, x: Array) -> int:
         """Return the number of unstable multipliers, without one that is always 1."""
@@ -116,8 +117,10 @@ class PeriodicCollocation(OfCycles, Collocation):
         #: The matrix S of the symmetry u(1) = S u(0), of states divided by their sizes; the identity where there is none.
         self.turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
         check_windings(problem.angles, self.free, values)
+        once = gain(problem.angles, problem.state_names, values)  # u(1) = S u(0) + once
+        gained = itertools.accumulate([once] * self.order, lambda before, more: problem.symmetry @ before + more)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
-        self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
+        self.gains: Array = np.array([np.zeros(once.size), *gained])
 
     def events(self) -> list[Event]:
         """Return also those of conditions along the cycle."""
@@ -209,20 +212,15 @@ class PeriodicCollocation(OfCycles, Collocation):
         found[round_] = self.circles[round_, None] * [0.5, -0.5]
         found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
-        return np.concatenate([found.ravel(), self._extremes_of_following(x), own, super().functionals(x)])
+        if count := len(self.problem.following):  # those of the polynomials through their values at the nodes
+            values = np.ascontiguousarray(self.following(x, self.nodes)).ravel()
+            own = [*extremes(self.degree, self.mesh, values, count).ravel(), *own]
+        return np.concatenate([found.ravel(), own, super().functionals(x)])
 
     def following(self, x: Array, times: Array) -> Array:
         """Return the states that follow from others at ``times`` (m,), shape (m, their number)."""
         at = [self.integrated.index(name) for name in self.problem.following]
         return self.integrands(x, times % 1.0, self.evaluate_scaled(x, times))[:, at]
-
-    def _extremes_of_following(self, x: Array) -> Array:
-        """Return the largest and smallest values of the polynomials through the states that follow, at the nodes."""
-        if not self.problem.following:
-            return np.empty(0)
-        values = np.ascontiguousarray(self.following(x, self.nodes))
-        found: Array = extremes(self.degree, self.mesh, values.ravel(), values.shape[1])
-        return found.ravel()
 
     def _whole(self, x: Array) -> tuple[Array, Array]:
         """Return the mesh and the values at the nodes over the whole orbit, on the unit interval."""
@@ -689,19 +687,6 @@ def _turns(times: Array) -> Indices:
     """Return how many parts lie between times and the unit interval, whose both ends belong to it."""
     inside = not times.size or (times.min() >= 0 and times.max() <= 1)
     return np.zeros(times.shape, dtype=int) if inside else np.floor(times).astype(int)
-
-
-def _gains(once: Array, symmetry: Array, order: int) -> Array:
-    """Return what angles have gained after 0, 1, ... parts with u(1) = S u(0) + once, shape (order + 1, n)."""
-    found = [np.zeros(once.size)]
-    for _ in range(order):
-        found.append(symmetry @ found[-1] + once)
-    return np.array(found)
-
-
-def is_opposite(frequency: float) -> bool:
-    """Return whether a multiplier with this angle is -1, up to round-off."""
-    return abs(frequency - math.pi) < APART
 
 
 def is_pair(values: ComplexArray) -> Mask:

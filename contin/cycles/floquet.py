@@ -185,7 +185,8 @@ def doubling(order: int = 1) -> Event:
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
     label, name = (Label.PERIOD_DOUBLING, "period doubling") if order % 2 else (Label.BRANCH_POINT, "symmetry breaking")
-    return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling, normal_form=flip)
+    given: Any = {"search": _doublings, "asks": _may_double, "normal_form": flip}
+    return Event(label, name, _antiperiodic, describe=lambda trial: {"frequency": math.pi, "pairs": 1}, **given)
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -195,10 +196,6 @@ def _antiperiodic(trial: Trial) -> float:
         ahead = np.exp(1j * values.imag)
         factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
         return float(np.prod(factors).real)
-
-
-def _of_doubling(trial: Trial) -> dict[str, float]:
-    return {"frequency": math.pi, "pairs": 1}
 
 
 def doubles(point: Solution) -> bool:
@@ -226,7 +223,7 @@ def _may_double(arc: Arc) -> bool:
 
 def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
-    if _is_still(arc):
+    if is_still(arc.trial):
         return []
     test = doubling(arc.trial.system.order)
     known = [trial.value(test) for _, trial in knots]
@@ -240,11 +237,6 @@ def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
               if sign_changed(left[1].value(test), right[1].value(test))
               and _changes_on_finer_mesh(left[1], right[1], test, arc.newton)]  # fmt: skip
     return [_doubtful(arc.locate(test, left, right)) for left, right in pieces]
-
-
-def _is_still(arc: Arc) -> bool:
-    """Return whether the cycle at the end of a step cannot be told from a homoclinic orbit."""
-    return bool(arc.trial.system.autonomous and arc.trial.system.intervals) and is_still(arc.trial)
 
 
 def _comes_near(arc: Arc, what: int) -> bool:
@@ -264,10 +256,7 @@ def _without_trivial(trial: Trial) -> ComplexArray:
 
 
 def keep_off_one(arc: Arc) -> bool:
-    """Return whether no multiplier but the one that is 1 comes near 1 in a step of a branch of cycles, by those at both ends.
-
-    That is where cycles branch.
-    """
+    """Return whether no multiplier but the one that is 1 comes near 1, where cycles branch, by those at both ends of a step."""
     return not _comes_near(arc, ONE)
 
 
@@ -301,9 +290,10 @@ def _may_twist(arc: Arc) -> bool:
 
 def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    if _is_still(arc) or not _may_twist(arc):
+    if is_still(arc.trial) or not _may_twist(arc):
         return []
-    return [_doubtful(point) for point in hopf_points(arc, knots) if _passes(arc, point)]
+    found = hopf_points(arc, knots)  # the pair must lie inside the circle on one side, and outside on the other
+    return [_doubtful(each) for each in found if not each.is_located or passes(arc, each.at, each.details["frequency"])]
 
 
 @functools.lru_cache(maxsize=4)
@@ -321,8 +311,3 @@ def _mean_little(trial: Trial) -> bool:
     """Return whether the multiplier that is 1 has such an error that others mean little."""
     trivial = _trivial(trial.system, trial.x)
     return trivial is not None and not abs(np.expm1(trial.system.eigenvalues(trial.x)[trivial])) <= _MEANINGLESS
-
-
-def _passes(arc: Arc, point: SpecialPoint) -> bool:
-    """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
-    return not point.is_located or passes(arc, point.at, point.details["frequency"])

@@ -1,8 +1,7 @@
 """Normal forms of cycles, and of cycles of maps: the linearization over one round, and their characteristic matrices.
 
-The linearization of a cycle over one round, with any condition between its ends.
-
-With a symmetry S of the cycle a round is one n-th of the period, and E0 in the conditions stands for S E0.
+A cycle is linearized over one round with any condition between its ends. With a symmetry S of the cycle a round is one n-th of
+the period, and E0 in the conditions stands for S E0.
 
 Collocated, v' = T F_u v has the rows C v = 0. With v(1) = P v(0) for several copies of v that the small matrix P couples (or
 one copy with the number P), a perturbation is multiplied by an eigenvalue of P in each round:
@@ -30,13 +29,11 @@ where r is the right side of C and y = H v. The columns of K solve C v = 0, C v 
 with b_E, b_e and c_a in the columns of g, g and a: a dense matrix of n + 2 rows for each copy. The transposed matrix has the
 same parts.
 
-The characteristic matrices of cycles, and of cycles of maps, and their forms (`contin.events.normal_forms`).
-
-Time is measured in periods, s = t / T, so that the field is G = T F; J, B and C are its derivatives of first, second and third
-order along the cycle. L(mu) v = v' - J v, with v(1) = mu v(0) (with a symmetry of order n, over one n-th
-of the period, with S v(0) for v(0)). Near a bifurcation time goes on by ds/dt = (1 - stretch) / T, but evenly with a forcing.
-The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the discrete
-equations, so that the coefficients converge with the cycle.
+In the characteristic matrices and their forms (`contin.events.normal_forms`) time is measured in periods, s = t / T, so that
+the field is G = T F; J, B and C are its derivatives of first, second and third order along the cycle. L(mu) v = v' - J v, with
+v(1) = mu v(0) (with a symmetry of order n, over one n-th of the period, with S v(0) for v(0)). Near a bifurcation time goes on
+by ds/dt = (1 - stretch) / T, but evenly with a forcing. The mean of |v|^2 over the period is one, and at folds v is normal to
+u0' in the mean. Products with w are those of the discrete equations, so that the coefficients converge with the cycle.
 
 With the derivatives A_j, B and C of a map f at the points of a cycle, L(mu) v = r stands for the cyclic linear equations
 
