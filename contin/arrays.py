@@ -24,14 +24,9 @@ Function = Callable[..., Any]
 class Named(Protocol):
     """States or parameters as users' functions get them: ``u.x``, ``u[0]``, ``x, y = u``; numbers, or recorded ones."""
 
-    def __getattr__(self, name: str) -> Any:
-        """Return one by its name."""
-
-    def __getitem__(self, place: int) -> Any:
-        """Return one by its place."""
-
-    def __iter__(self) -> Iterator[Any]:
-        """Iterate over all."""
+    def __getattr__(self, name: str) -> Any: ...
+    def __getitem__(self, place: int) -> Any: ...
+    def __iter__(self) -> Iterator[Any]: ...
 
 
 #: Points of a mesh, as a user gives them.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,20 +38,7 @@ from contin.problems.angles import whole_rounds
 from contin.problems.statement import Statement
 
 
-class _Given(Protocol):
-    """A problem with a Jacobian."""
-
-    jacobian: Any
-
-    @property
-    def compared(self) -> list[bool]: ...
-    @property
-    def state_names(self) -> Sequence[str]: ...
-    def batch(self, name: str) -> Batch: ...
-    def jacobian_at(self, u: Array, p: Array) -> Any: ...
-
-
-def check_given(problem: _Given, u: Array, p: Array) -> None:
+def check_given(problem: Any, u: Array, p: Array) -> None:
     """Compare a given Jacobian with differences of the residual along a random direction, the first time.
 
     Raises ProblemError where an entry is wrong; the message names it.
@@ -134,11 +121,6 @@ class CriticalPair(NamedTuple):
 #: Largest distance of a critical eigenvalue from i omega, relative to omega: Hopf points are located to 1e-9. Where it is ten
 #: times larger, a kind of problem with another stability is taken for a field if an eigenvalue lies so near by chance.
 _CRITICAL = 1e-4
-
-
-def has_pair(jacobian: Array, frequency: float) -> bool:
-    """Return whether a matrix has the eigenvalue i ``frequency``, as at a Hopf point."""
-    return bool(np.abs(eigenvalues(jacobian) - 1j * frequency).min() < _CRITICAL * abs(frequency))
 
 
 def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPair:
@@ -270,8 +252,7 @@ class Algebraic(Spectral, Composed):
 
     @functools.cached_property
     def is_sparse(self) -> bool:
-        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse
-        one."""
+        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as such."""
         if self.problem.jacobian is not None:
             return self.state_size >= MANY and self.problem.gives_sparse_matrix
         return self.state_size >= MANY and self._terms[0].columns.rows.size <= _FEW * self.size * self.equations
@@ -294,35 +275,26 @@ class Algebraic(Spectral, Composed):
     def _given_jacobian(self, x: Array, given: Inputs) -> tuple[Array, Any]:
         """Return the same with the derivatives by states from the user's function."""
         values, by_parameters = self._residual.jacobian(*given, self._residual.columns(self._free, ()))
-        matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))
-        rows, columns = 1 / self.scales.rows["residual"], self.scales.states
-        matrix = matrix * columns * rows[:, None] if not self.is_sparse else matrix.multiply(columns).multiply(rows[:, None])
+        matrix: Any = self.problem.jacobian_at(self.states(x)[0], self.all_parameters(x))
+        rows, columns = 1 / self.scales.rows["residual"][:, None], self.scales.states
         if not self.is_sparse:
-            return values[0], np.hstack([matrix, by_parameters[0]])
+            return values[0], np.hstack([_dense(matrix) * columns * rows, by_parameters[0]])
         from scipy.sparse import csr_array, hstack
 
-        return values[0], hstack([csr_array(matrix), csr_array(by_parameters[0])]).tocsr()
-
-    def _own_jacobian(self, u: Array, p: Array) -> Any:
-        """Return the user's Jacobian; dense unless `is_sparse`."""
-        matrix = self.problem.jacobian_at(u, p)
-        return matrix if self.is_sparse else _dense(matrix)
+        return values[0], hstack([csr_array(matrix.multiply(columns).multiply(rows)), csr_array(by_parameters[0])]).tocsr()
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
         residual, jacobian = self._jacobian(x)
-        if not self.is_sparse:
-            matrix = np.zeros((self.equations + len(rows), self.size + len(columns)))
-            matrix[: self.equations, : self.size] = jacobian
-            for number, column in enumerate(columns):
-                matrix[: self.equations, self.size + number] = column
-            for number, row in enumerate(rows):
-                matrix[self.equations + number] = row
-            return residual, DenseFactors(matrix)
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        if not self.is_sparse:
+            matrix = np.zeros((self.equations + len(rows), self.size + len(columns)))
+            matrix[: self.equations, : self.size], matrix[: self.equations, self.size :] = jacobian, columns.T
+            matrix[self.equations :] = rows
+            return residual, DenseFactors(matrix)
         from scipy.sparse import csr_array, hstack, vstack
 
         beside = hstack([jacobian, csr_array(columns.T)]) if len(columns) else jacobian
@@ -519,7 +491,9 @@ class Algebraic(Spectral, Composed):
         if point.test is None or point.test.normal_form is fold:
             return None
         frequency, x = frequency_of(point), point.trial.x
-        if frequency is None or not point.is_simple or not has_pair(self.jacobian(x), frequency):
+        if frequency is None or not point.is_simple:
+            return None
+        if not np.abs(eigenvalues(self.jacobian(x)) - 1j * frequency).min() < _CRITICAL * abs(frequency):
             return None
         return at_special_point(self, point) if self.is_smooth(x, frequency) else NOT_SMOOTH
 

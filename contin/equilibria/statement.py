@@ -173,8 +173,7 @@ class AlgebraicProblem(Restated):
 
     @functools.cached_property
     def reduced(self) -> ReducedProblem | None:
-        """The same equilibria with conserved totals as parameters, without the states that follow; None where nothing is
-        conserved."""
+        """The same with conserved totals as parameters, without the states that follow; None where nothing is conserved."""
         totals = conservation_laws(self)
         return ReducedProblem(self, totals) if len(totals) else None
 
