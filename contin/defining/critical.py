@@ -1,6 +1,4 @@
-"""Curves along which an eigenvalue, or a pair, stays critical: of Hopf points, period doublings and tori.
-
-Defining systems of curves along which a pair of eigenvalues, or a multiplier other than one, is critical.
+"""Curves along which a pair of eigenvalues, or a multiplier other than one, stays critical: Hopf points, doublings and tori.
 
 The characteristic matrix L(P) (`contin.events.normal_forms`) is singular where an eigenvalue of the small matrix P is critical:
 P is a number where that is real, and else couples two copies of the unknowns. With real borders and v = v_1 + i r v_2, r the
@@ -16,10 +14,8 @@ the angle at torus bifurcations):
 They stay regular where r passes zero and the pair becomes real (Bogdanov-Takens points, strong resonances). A curve has the
 unknowns [x | kappa] and the equations F = 0, g = 0. The gradient of g_i is -w_i.(dL v), with w_i from the transposed matrix.
 
-The defining system of a curve of Hopf points, of equilibria and of fields, in two parameters.
-
-With A the Jacobian and v = v_1 + i omega v_2, the equations A v = i omega v are A v_1 = -kappa v_2 and A v_2 = v_1: kappa is
-omega^2, and
+For a curve of Hopf points, of equilibria and of fields, with A the Jacobian and v = v_1 + i omega v_2, the equations A v = i
+omega v are A v_1 = -kappa v_2 and A v_2 = v_1: kappa is omega^2, and
 
                                                         [ 0   -kappa ]
                                                     P = [            ].

@@ -297,9 +297,7 @@ class EventCurve(Defining):
     - ``gradient`` (callable, optional): ``gradient(system, x)`` returns the derivatives by x, shape (size,).
     """
 
-    def __init__(
-        self, base: Any, event: Event, gradient: Callable[[Any, Array], Array] | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, base: Any, event: Event, gradient: Callable[[Any, Array], Array] | None = None) -> None:
         super().__init__(base)
         self.event, self._gradient = event, gradient
 
@@ -361,16 +359,13 @@ class EventCurve(Defining):
             for test in others
         ]
         name = f"the end of {self.event.name!r}, whose confirm returns False"
-        ends = [Event(Label.END, name, _confirmed, terminal=True)] if self.event.confirm else []
+        end = Event(Label.END, name, lambda trial: 1.0 if trial.system.is_confirmed(trial.x) else -1.0, terminal=True)
+        ends = [end] if self.event.confirm else []
         return [*super().events(), *ends, *inside]
 
     def judged(self, point: SpecialPoint) -> SpecialPoint:
         """Return a special point, by the label and name that the kind knows it by."""
         return self.base.judged_on_curve(point, _solution(point.trial))
-
-
-def _confirmed(trial: Trial) -> float:
-    return 1.0 if trial.system.is_confirmed(trial.x) else -1.0
 
 
 def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:

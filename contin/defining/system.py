@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
@@ -29,7 +30,6 @@ from contin.core.protocol import Carrier, Discretization
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
-from contin.functions.batch import Batch
 from contin.linalg.blocks import Factors
 from contin.linalg.border import ReplacedRows
 from contin.problems.rewriting import found_elsewhere
@@ -317,6 +317,11 @@ class _Inside:
         return self._factors.solve(wide)[..., : base.size]
 
 
+def _of_the_problem(name: str) -> Any:
+    """Return what the problem of a statement has under this name, as a property."""
+    return property(operator.attrgetter(f"problem.{name}"))
+
+
 @dataclasses.dataclass(frozen=True)
 class _Statement:
     """The statement behind a defining system: that of the problem, but for the number of free parameters."""
@@ -325,15 +330,7 @@ class _Statement:
     free_size: int
     columns: tuple[str, ...] = ()
 
-    @property
-    def states(self) -> Any:
-        """Names of the states."""
-        return self.problem.states
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """Parameters of the problem."""
-        return self.problem.parameters
+    states, parameters, angles, batch = map(_of_the_problem, ("states", "parameters", "angles", "batch"))
 
     @property
     def functionals(self) -> Mapping[str, Function]:
@@ -346,11 +343,6 @@ class _Statement:
         return multipliers_of(self.problem)
 
     @property
-    def angles(self) -> Mapping[str, float]:
-        """Those of the problem."""
-        return self.problem.angles
-
-    @property
     def symmetries(self) -> Mapping[str, Any]:
         """None: images are of solutions."""
         return {}
@@ -359,7 +351,3 @@ class _Statement:
     def phases(self) -> tuple[str, ...]:
         """Those of the problem."""
         return phases_of(self.problem)
-
-    def batch(self, name: str) -> Batch:
-        """Return functions of the problem, compiled."""
-        return self.problem.batch(name)
