@@ -282,7 +282,9 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         return largest(places[:, None] + (ends - places)[:, None] * _PARTS, places, which).max(axis=1)
 
     with np.errstate(all="ignore"):
-        a, b, which = brackets(*_sampled(system, selections, x, p))
+        nodes = system.nodes
+        times = np.sort(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) / 2]))
+        a, b, which = brackets(times, sides(times))
         if not a.size:
             return NOWHERE
         units = sizes()[selections.of_gaps[:, 1]]
@@ -311,14 +313,6 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
     known = np.concatenate([[mesh[0], mesh[-1]], system.breaks])
     kept &= (np.abs(places[:, None] - known) > edge).all(axis=1)
     return _merged(Switching(places[kept], costs[kept], jumps[kept], tuple(selections.names[k] for k in which[kept])), system)
-
-
-def _sampled(system: Any, selections: Selections, x: Array, p: Array) -> tuple[Array, Array]:
-    """Return the times of the nodes and of the middles between them, and the sides there."""
-    nodes = system.nodes
-    times = np.empty(2 * nodes.size - 1)
-    times[::2], times[1::2] = nodes, (nodes[1:] + nodes[:-1]) / 2
-    return times, selections.sides(times, system.evaluate(x, times), p)
 
 
 def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Array) -> Array:

@@ -173,20 +173,15 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     derivative = basis.highest @ local / h[:, None] ** d
     jumps = np.abs(derivative[1:] - derivative[:-1]) / ((h[1:] + h[:-1]) / 2)[:, None]
     jumps = (jumps / np.maximum(1.0, np.abs(states).max(axis=0))).max(axis=1)
-    if len(breaks):
-        jumps = _without_breaks(jumps, mesh, breaks)
+    if len(breaks):  # a jump there is no larger than the next ones on both sides
+        inside = near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
+        beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
+        largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
+        jumps = np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
     return both.max(axis=0) ** (1 / (d + 1))
-
-
-def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
-    """Return the jumps at inner mesh points, that at a break no larger than the next ones on both sides."""
-    inside = near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
-    beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
-    largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
-    return np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
 
 
 def near(places: Array, breaks: Array, length: float) -> Array:

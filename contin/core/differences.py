@@ -1,13 +1,10 @@
 """Derivatives along a line by differences, with an estimate of their error, and multilinear forms.
 
-Derivatives along a line by differences, with an estimate of their error.
+Differences serve what states no derivatives: discretizations and functions that others have written. Everything in `contin`
+itself has exact ones.
 
-They serve what states no derivatives: discretizations and functions that others have written. Everything in `contin` itself
-has exact ones.
-
-Multilinear forms: derivatives of a function along several directions, combined.
-
-Directions are numbered, and a derivative along some of them belongs to a tuple of their numbers, in order.
+Multilinear forms are derivatives of a function along several directions, combined. Directions are numbered, and a derivative
+along some of them belongs to a tuple of their numbers, in order.
 """
 
 from __future__ import annotations

@@ -307,7 +307,8 @@ def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Ar
         x, near = np.array(guess, dtype=float), _NEAR
         with np.errstate(all="ignore"):
             for _ in range(MOST_STEPS):
-                update, factors = _correction(system, x)
+                residual, factors = system.linearize(x)
+                update = factors.solve(residual)
                 size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
                 if size < near:
                     yield x
@@ -316,11 +317,6 @@ def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Ar
                 if part < _LEAST_PART:
                     break
                 x = x - part * update
-
-
-def _correction(system: Equations, x: Array) -> tuple[Array, Factors]:
-    residual, factors = system.linearize(x)
-    return factors.solve(residual), factors
 
 
 def _part_taken(system: Equations, x: Array, update: Array, factors: Factors, enough: float) -> float:

@@ -1,7 +1,5 @@
 """Eigenvalues of the linearization in time, and which lie on the imaginary axis or the unit circle up to round-off.
 
-Eigenvalues that lie on the imaginary axis, and multipliers on the unit circle, as far as round-off lets one tell.
-
 In a conservative system pairs stay there, and a second multiplier of cycles is one. Round-off moves them to either side. How
 far is seen by rounding what they are computed from once more, up or down by chance: they change by their round-off.
 """

@@ -3,11 +3,10 @@
 With the tangent t of the last point x the corrector solves F(z) = 0 together with t.(z - x) = step, in the weighted inner
 product. The bordered matrix [F_x; row], row.v = t.v, is regular along the curve, folds included, and gives the next tangent.
 
-A point of a curve on a mesh with points where conditions that the solution decides switch.
-
-Where such a condition switches inside an interval, the discrete equations have errors of their own that jump from place to
-place. So each point of a curve is corrected again on a mesh with points there. As mesh points move with the solution, two
-points of a step are on two meshes; what is searched between them sees each as carried back to the mesh of the step.
+Where a condition that the solution decides switches inside an interval, the discrete equations have errors of their own that
+jump from place to place. So each point of a curve is corrected again on a mesh with points there. As mesh points move with the
+solution, two points of a step are on two meshes; what is searched between them sees each as carried back to the mesh of the
+step.
 """
 
 from __future__ import annotations
@@ -226,11 +225,8 @@ def settled(trial: Trial, along: Array, newton: Newton) -> Trial:
             found = trial_of(system, dataclasses.replace(done, iterations=trial.iterations, error=trial.newton_error), row)
         except ConvergenceError:
             break
-    return trial if found is trial else _carried_back(trial, found)
-
-
-def _carried_back(trial: Trial, found: Trial) -> Trial:
-    """Return a point of another mesh on that of a trial."""
+    if found is trial:
+        return trial
     system = trial.system
     carry = found.system.carrier(system)
     tangent = carry(found.tangent)

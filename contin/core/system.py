@@ -1,7 +1,5 @@
 """Discretized problems of all kinds: names, values and places of parameters, and sizes by which unknowns are divided.
 
-Scales: sizes of states and parameters, by which the unknowns of a discretized problem are divided.
-
 All tolerances, steps and norms of the engine are made for unknowns of order one. A system with scales works on x = (u / s_u, p
 / s_p), and on equations divided by sizes of their own, so that a problem in newtons and one in giganewtons are the same
 problem. Scales are powers of two: multiplication by them is exact.
