@@ -231,7 +231,7 @@ def _located(arc: Arc, pending: list[Extremum]) -> tuple[SpecialPoint | None, li
     before, after = (first.at(system, end.x).excess for end in (arc.before, arc.trial))
     part = float(np.clip(before / (before - after), 0, 1)) if before != after else 1.0
     batch, x = system.problem.batch("field"), arc.guess(arc.low + (arc.step - arc.low) * part)
-    names = [source(batch, place) for place in batch.conditions(range(len(system.parameters)))]
+    names = [source(batch, place) or "a condition" for place in batch.conditions(range(len(system.parameters)))]
     try:
         near = first.nearest(system, numbers(system, x).extrema) or first
         if np.isnan(_number(system, x, near)[2]):

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
 
 import contin
 
@@ -66,6 +68,33 @@ def test_a_beam_reaches_an_elastic_stop(tmp_path):
     assert again.details.names == touch.details.names and again.details.times == touch.details.times
     back = contin.trace(branch[-1], free=["q"], direction=-1, limits={"q": (0.5, 4)})
     assert abs(back.labelled("GR")[0]["q"] - 1.6) < 1e-12 and back[-1]["q"] == 0.5
+
+
+def test_a_pendulum_that_goes_round():
+    """The sine of the angle is 1 once a round, whatever its speed."""
+
+    def field(u, p):
+        return u.y, p.M - np.sin(u.th) - 0.2 * u.y - 2 * max(np.sin(u.th) - p.h, 0)
+
+    problem = contin.CycleProblem(field, ["th", "y"], {"M": 1.0, "h": 1.5}, angles=["th"])
+    start = contin.cycle(problem, [0.0, 5.0])
+    branch = contin.trace(start, free=["h", "period"], limits={"h": (0.5, 1.5)}, direction=-1)
+    assert [point.label for point in branch if point.label] == ["EP", "GR", "EP"] and not branch.notes
+    assert abs(branch.labelled("GR")[0]["h"] - 1) < 1e-12
+
+
+def test_a_column_meets_an_elastic_bed():
+    """Its middle touches where Euler's elastica is .3 high: 2 k / sqrt(P) = .3 with sqrt(P) = 2 K(k)."""
+    column = contin.VariationalProblem(
+        energy=lambda t, x, w, p: w.angle**2 / 2 + p.P * math.cos(x.angle) + 20 * max(x.y - 0.3, 0) ** 2,
+        states=["y", "angle"], parameters={"P": 9.0}, kinematics=lambda t, x, w, p: (math.sin(x.angle), w.angle),
+        controls=["angle"], ends=lambda a, b, p: (a.y, b.y),
+    )  # fmt: skip
+    straight = contin.trace(contin.solve(column, [0, 0]), free=["P"], limits={"P": (9, 12)})
+    branch = [contin.trace(straight.labelled("BP")[0], branch=1, direction=way, limits={"P": (9, 13)}) for way in (1, -1)]
+    (touch,) = [point for each in branch for point in each.labelled("GR")]
+    k = brentq(lambda k: k / ellipk(k * k) - 0.3, 0.1, 0.9, xtol=1e-15)
+    assert abs(touch["P"] - 4 * ellipk(k * k) ** 2) < 1e-11 and touch.index == 0 and "a condition" in touch.name
 
 
 def test_a_cycle_in_the_plane_reaches_a_stop():
