@@ -121,7 +121,7 @@ def correct(
     >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
     0.8
     """
-    work = getattr(system, "workspace", None) if sizes is None else None
+    work, guess = getattr(system, "workspace", None) if sizes is None else None, np.asarray(guess, dtype=float)
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
             if work is not None and isinstance(factors, Factorization) and factors.unknowns == len(guess):
@@ -143,7 +143,7 @@ def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
 def _in_one_call(
     system: Any,
     work: one_call.Workspace,
-    guess: Sequence[float] | Array,
+    guess: Array,
     row: Array | None,
     target: float | Array,
     newton: Newton | None,
@@ -161,7 +161,7 @@ def _in_one_call(
     if row is not None:
         values.rows[own], values.targets[own] = row, target
     tolerance, most = (0.0, 0) if newton is None else (newton.tolerance, newton.max_iterations)
-    x, report = np.array(guess, dtype=float), np.zeros(one_call.UPDATES + max(most, CHORDS))
+    x, report = guess.copy(), np.zeros(one_call.UPDATES + max(most, CHORDS))
     factors = system.unfilled_factors() if near is None else near
     tangent, control = np.empty(x.size), one_call.Control(tolerance, most, near is not None, linearize)
     done = one_call.correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
@@ -179,16 +179,11 @@ def _in_one_call(
 
 
 def _newton(
-    system: Equations,
-    guess: Sequence[float] | Array,
-    row: Array | None,
-    target: float | Array,
-    newton: Newton,
-    sizes: Sizes | None,
+    system: Equations, guess: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes | None
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
-    x, updates, before, moved = np.array(guess, dtype=float), list[float](), math.inf, 1.0
+    x, updates, before, moved = guess.copy(), list[float](), math.inf, 1.0
     factors: Factors | None = None
     with np.errstate(all="ignore"):
         for number in range(1, newton.max_iterations + 1):
@@ -361,16 +356,10 @@ def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Ar
 
 
 def _chords(
-    system: Equations,
-    guess: Sequence[float] | Array,
-    row: Array | None,
-    target: float | Array,
-    newton: Newton,
-    factors: Factors,
+    system: Equations, guess: Array, row: Array | None, target: float | Array, newton: Newton, factors: Factors
 ) -> Corrected:
     """Chord steps with factors from elsewhere, for a guess that is close; raise ConvergenceError where they converge slowly."""
-    x = np.array(guess, dtype=float)
-    sizes: list[float] = []
+    x, sizes = guess.copy(), list[float]()
     with np.errstate(all="ignore"):
         while len(sizes) < CHORDS:
             residual = system.residual(x)

@@ -60,6 +60,15 @@ def _of_the_base(name: str) -> Any:
     return method
 
 
+def _with_factors(name: str) -> Any:
+    """Return such a method that takes factors, too; the error of the singular vectors is not in what it estimates."""
+
+    def method(self: Defining, x: Array, factors: Factors, *more: Any) -> Any:
+        return getattr(self.base, name)(self.inside(x), _Inside(factors, self), *more)
+
+    return method
+
+
 class Defining(Discretization):
     """A defining system: names and columns are those of the underlying system ``base``.
 
@@ -209,28 +218,16 @@ class Defining(Discretization):
         """Names of the states that are columns of the underlying system."""
         return self.base.named_states
 
-    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
-        """Return the estimated error of the solution and the parameters; that of the singular vectors is not in it."""
-        inside: Any = _Inside(factors, self)
-        return self.base.discretization_error(self.inside(x), inside, columns)
-
-    def newton_error(self, x: Array, factors: Factors) -> float:
-        """Return that of the underlying system."""
-        inside: Any = _Inside(factors, self)
-        return self.base.newton_error(self.inside(x), inside)
-
     def lifted(self, x: Array, reference: Array) -> Array:
         """Return x with the angles of the underlying system moved by whole rounds, nearest to those of a reference."""
         size = self.base.size
         return np.append(self.base.lifted(x[:size], reference[:size]), x[size:])
 
-    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
-        """Return those of the underlying system, along the curve's own equations."""
-        inside: Any = _Inside(factors, self)
-        return self.base.cut_off_errors(self.inside(x), inside)
-
     states, evaluate, all_parameters, parameter, functionals, switching = map(
         _of_the_base, ("states", "evaluate", "all_parameters", "parameter", "functionals", "switching")
+    )
+    discretization_error, newton_error, cut_off_errors = map(
+        _with_factors, ("discretization_error", "newton_error", "cut_off_errors")
     )
 
     def parameter_index(self, name: str) -> int:
