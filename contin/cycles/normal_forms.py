@@ -230,12 +230,15 @@ class Round:
 MOST = 2000
 
 
-def multiplier(rate: complex) -> Any:
-    """Return exp(rate); a real number where it is real but for round-off."""
-    return np.real_if_close(np.exp(rate))[()]
+class RoundForm(Form):
+    """The form of a cycle, of vector fields or maps: perturbations are multiplied in a round."""
+
+    def coupling(self, rate: complex) -> Any:
+        """Return the multiplier exp(rate); a real number where it is real but for round-off."""
+        return np.real_if_close(np.exp(rate))[()]
 
 
-class MapForm(DenseForm):
+class MapForm(RoundForm, DenseForm):
     """That of a cycle of a map.
 
     - ``system`` (MapSystem)
@@ -250,16 +253,12 @@ class MapForm(DenseForm):
         matrix[np.arange(size - n, size), np.arange(n)] += 1.0  # of the first point itself: P stands there
         super().__init__(matrix, n, lambda stacks: system.stack_along(x, stacks), system.weights[:size])
 
-    def coupling(self, rate: complex) -> Any:
-        """Return the multiplier."""
-        return multiplier(rate)
-
     def unit(self, rate: complex) -> complex:
         """Return one over the multiplier."""
         return complex(np.exp(-rate))
 
 
-class CycleForm(Form):
+class CycleForm(RoundForm):
     """That of a cycle of a vector field.
 
     - ``system`` (PeriodicCollocation)
@@ -293,10 +292,6 @@ class CycleForm(Form):
         """Return the part of w that belongs to the condition between the ends of the round, and S v(0)."""
         n, size = self.system.states_count, self.system.state_size
         return left[..., size - n : size], right[..., :n] @ self.system.turn.T
-
-    def coupling(self, rate: complex) -> Any:
-        """Return the multiplier."""
-        return multiplier(rate)
 
     def unit(self, rate: complex) -> complex:
         """Return one over the unit of time."""

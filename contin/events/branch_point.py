@@ -209,11 +209,6 @@ class BranchPoint(Finding):
         return noise[system.state_size :]
 
     @property
-    def leaving(self) -> tuple[Array, ...]:
-        """Its tangents."""
-        return self.tangents
-
-    @property
     def arrays(self) -> dict[str, Array]:
         """What is stored, by name."""
         return {

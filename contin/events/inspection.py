@@ -1,11 +1,9 @@
 """The special points inside a step, and where a branch ends by itself.
 
-The quantity that vanishes on a trivial branch (``settings.trivial``): its round-off, and what its values at two points say.
-
-A branch ends on the trivial one where the quantity crosses zero with a slope: at both ends of the step it is well above its
-round-off, and its signs differ. Where it falls from well above its round-off to next to nothing Newton's method has left for
-the trivial branch: the step is refused. Where it is round-off at the beginning already (it can decay along a branch that runs
-on, beside a homoclinic orbit), its sign says nothing.
+A branch ends on the trivial one where the quantity that vanishes there (``settings.trivial``) crosses zero with a slope: at
+both ends of the step it is well above its round-off, and its signs differ. Where it falls from well above its round-off to next
+to nothing Newton's method has left for the trivial branch: the step is refused. Where it is round-off at the beginning already
+(it can decay along a branch that runs on, beside a homoclinic orbit), its sign says nothing.
 
 In order: the end on the trivial branch, or a branch point, or several; zeros of the test functions, looked for between the
 folds; the folds; the end of a closed branch. What was located is sorted by its distance along the step.

@@ -151,15 +151,11 @@ def _around(arc: Arc, window: Window) -> list[Trial]:
         if number < _FEWEST:
             guess = state.x + place * state.tangent
         else:
-            guess = _through(places[known], points[known], place)
+            weights = 1 / np.prod(places[known, None] - places[known] + np.eye(len(places[known])), axis=1)
+            along = interpolation(places[known], weights, np.array([place]))[0]
+            guess = along @ np.array([point.x for point in points[known]])
         points.append(located(state, guess, float(place), arc.newton))
     return points
-
-
-def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
-    """Return the polynomial through points at a place beyond them, shape (size,)."""
-    weights = 1 / np.prod(places[:, None] - places + np.eye(len(places)), axis=1)
-    return interpolation(places, weights, np.array([place]))[0] @ np.array([point.x for point in points])
 
 
 def _interpolated(window: Window, points: Sequence[Trial], functions: Functions, count: int) -> InterpolatedZero:

@@ -34,7 +34,7 @@ class Finding:
     @property
     def leaving(self) -> tuple[Array, ...]:
         """Unit tangents of the branches that meet there, first that of the branch it was found on."""
-        return ()
+        return getattr(self, "tangents", ())
 
     #: Whether equations of its own locate it again, and not those of a test function.
     has_equations: ClassVar[bool] = False

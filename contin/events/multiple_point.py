@@ -103,11 +103,6 @@ class MultiplePoint(Finding):
         return self.dimension
 
     @property
-    def leaving(self) -> tuple[Array, ...]:
-        """Its tangents."""
-        return self.tangents
-
-    @property
     def arrays(self) -> dict[str, Array]:
         """What is stored, by name."""
         return {"kernel": self.kernel, "tangents": np.array(self.tangents)}

@@ -1,9 +1,7 @@
 """The test functions of every run: special points, limits, values of columns, and their extreme values.
 
-Extrema of a column G (a parameter or functional) on the solutions of F = 0: first and second derivatives.
-
-On the manifold F = 0 of dimension j the derivatives of G along a basis V of its tangents vanish at an extremum. With j rows Phi
-that make the matrix regular,
+At an extremum of a column G (a parameter or functional) on the manifold F = 0 of dimension j the derivatives of G along a basis
+V of its tangents vanish. With j rows Phi that make the matrix regular,
 
                               [ F_x ]                        T  [ lambda ]
                           M = [     ],    M V = [0; I],     M   [        ] = G_x^T,

@@ -55,14 +55,14 @@ class Watch:
         if shrinks is not None:
             homes.append(lambda inspection: inspection.arc.trial.system.home(inspection.arc))  # the kind of problem knows it
             self._asks.append(_sign(shrinks))
-        if settings.trivial is not None:
+        if (name := settings.trivial) is not None:
             homes.append(Inspection.trivial_end)
-            self._asks.append(_trivial(settings.trivial))
-            self._of_equations.append(_lost_home(settings.trivial))
+            self._asks.append(lambda each: crossed(each.arc.before, each.arc.trial, name, each.arc.newton))
+            self._of_equations.append(_lost_home(name))
         self._of_equations.append(_lost_branch_point if settings.branch_points else _strays)
-        if self.index is not None:
-            self._asks.append(_changed(self.index))
-            self._doubts.append(_contradicts(self.index))
+        if (index := self.index) is not None:
+            self._asks.append(lambda each: abs(each.arc.before.value(index) - each.arc.trial.value(index)) > 0)
+            self._doubts.append(_contradicts(index))
         if self.ends:
             self._doubts.append(self._lost_end)
         if any(test.label == Label.GRAZING for test in tests):
@@ -144,14 +144,6 @@ def _sign(test: Event) -> Asks:
     if test.search is not None or test.looks:
         return lambda _: True
     return lambda inspection: inspection.arc.passes(test)
-
-
-def _trivial(name: str) -> Asks:
-    return lambda inspection: crossed(inspection.arc.before, inspection.arc.trial, name, inspection.arc.newton)
-
-
-def _changed(index: Event) -> Asks:
-    return lambda inspection: abs(inspection.arc.before.value(index) - inspection.arc.trial.value(index)) > 0
 
 
 # --- who doubts --------------------------------------------------------------------------------------------------------
