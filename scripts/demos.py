@@ -30,6 +30,8 @@ def alone(name: str, repeats: int, as_auto: bool) -> None:
 
     if as_auto:
         ours.take_autos_tolerances()
+    else:
+        ours.take_path_tolerance()
     print(json.dumps(ours.run(name, repeats, checked=not as_auto)))
 
 

@@ -130,13 +130,15 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     if not found.label or not (found.is_located or found.stop is not None):
         return found  # a regular point, or one that gets no label
     labelled = found.label != Label.FAILED and not found.closes
-    first, coarse = found.trial, found.trial.system.coefficient(found)
+    before = found
     if found.errors is None and labelled and settings.errors:
         again = refined(found.same_as or found, settings)
         details = found.details if found.same_as else again.details
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors, is_lost=again.is_lost)
+        found = again.trial.system.judged(found) if found.at else found  # between mesh points, cycles are known better there
+    coarse = before.trial.system.coefficient(dataclasses.replace(before, label=found.label))
     if coarse is not None:
-        better = coarse if found.trial is first else found.trial.system.coefficient(found)
+        better = coarse if found.trial is before.trial else found.trial.system.coefficient(found)
         found = with_normal_form(found, better or coarse, coarse, settings.errors)
     return found
 

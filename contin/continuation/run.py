@@ -31,11 +31,12 @@ from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
 from contin.core.small import FAILED
-from contin.core.step import Reason, State, Stop, corrected, settled
+from contin.core.step import CLEAR, Reason, State, Stop, corrected, settled
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError, Grazing
 from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.corner import Way, changed_between, conditions, corner_at, hit_of, on_mesh_of, refrozen
+from contin.events.folds import STILL
 from contin.events.inspection import Start
 from contin.events.usual import extremum, fold, limits, user_zeros, within_limits
 from contin.events.watch import Watch
@@ -87,7 +88,8 @@ class Continuation:
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         check(system, settings)
         self.primary = settings.primary or system.free[0]
-        self._steps = Steps(settings, self.primary, fold(self.primary) if settings.folds else None)
+        self._settings, path = settings, settings.on_path(system if state is None else state.system)
+        self._steps = Steps(path, self.primary, fold(self.primary) if settings.folds else None)
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._conditions = conditions(self.state.system)
         if self._conditions:
@@ -98,13 +100,13 @@ class Continuation:
         general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
         self._tests = [*general, *self._conditions, *self._own]
         self._meshes = MeshPolicy(self._steps, general)
-        self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
+        self._notes = Notes(self.primary, path.mesh.tolerance, bool(settings.mesh.every))
         if conserved := getattr(system.solution.problem, "conserved", ""):
             self._notes.add(conserved)
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
-        self._watch = Watch(self.start, settings, self._tests, general, self._steps.fold)
+        self._watch = Watch(self.start, path, self._tests, general, self._steps.fold)
         if state is None:
             self._notes.check_phases(self.here())
         self._handed: Handed | None = None  # the next step, where a kernel has made it
@@ -114,13 +116,22 @@ class Continuation:
 
     @property
     def settings(self) -> Settings:
-        """The settings of the steps from here on."""
-        return self._steps.settings
+        """The settings of the run from here on."""
+        return self._settings
 
     @settings.setter
     def settings(self, settings: Settings) -> None:
-        self._steps = dataclasses.replace(self._steps, settings=settings)
-        self._meshes = dataclasses.replace(self._meshes, steps=self._steps)
+        self._settings = settings
+        self._follow()
+
+    def _follow(self) -> None:
+        """Make steps with the tolerance of the path, and exact ones where those cannot tell the primary's sense."""
+        state, settings = self.state, self._settings
+        if self._steps.fold is None or not STILL < abs(state.tangent[state.system.parameter_index(self.primary)]) < CLEAR:
+            settings = settings.on_path(state.system)
+        if settings != self._steps.settings:
+            self._steps = dataclasses.replace(self._steps, settings=settings)
+            self._meshes = dataclasses.replace(self._meshes, steps=self._steps)
 
     @property
     def state(self) -> State:
@@ -159,6 +170,7 @@ class Continuation:
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             self.stop = begins_outside(trial, self.settings, self._own, self.state.singular)
         while self.stop is None:
+            self._follow()
             yield from self._plain()
             yield from self._advance()
 
@@ -167,7 +179,7 @@ class Continuation:
         most = FEWEST
         while True:
             due, state = self._adapt(), self.state
-            lane = None if state.singular else self._lanes.of(state.system, self.settings, self._notes.is_noisy)
+            lane = None if state.singular else self._lanes.of(state.system, self._steps.settings, self._notes.is_noisy)
             if lane is None or runs_away(state.system, state.x, *self.start[:2]):
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
@@ -184,7 +196,7 @@ class Continuation:
 
     def _adapt(self) -> int:
         """Adapt the mesh, or borders, if that is due; return after how many steps the mesh is due again."""
-        state, control = self.state, self.settings.mesh
+        state, control = self.state, self._steps.settings.mesh
         every = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
         if every and state.accepted % every == 0 and self._adapted != state.accepted:
             self.go_on(self._meshes.adapted(state, self.here))
@@ -227,14 +239,16 @@ class Continuation:
         self._accuracy = accuracy_of(step.end)
         arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
         special = within_limits(arc, special, self._limits)
-        end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
-        found = [located_again(point, self.settings) for point in special[: end + 1]]
+        found = list[SpecialPoint]()
+        while len(found) < len(special) and not (found and found[-1].stop):
+            found.append(located_again(special[len(found)], self.settings))
+        goes_on = not (found and found[-1].stop)
         found = [point for point in found if is_confirmed(point, arc, self._notes)]
         last = self._left[-1][0] - arc.state.arclength if self._left else -np.inf  # a corner tells of branches there, too
         corner = next((point.at for point in found if point.test in self._conditions), last)
         found = [point for point in found if point.label != Label.BRANCH_POINT or abs(point.at - corner) > APART * arc.step]
         changes = index_changes(self._watch.index, arc, found, self._notes)
-        if end == len(special):
+        if goes_on:
             self._notes.doubts(self._watch.index, arc, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
             if point.test in self._conditions:
@@ -261,7 +275,7 @@ class Continuation:
         if other is not self.state.system:
             self.go_on(self._meshes.moved(self.state, self.here, (other, self.state.system.carrier(other))))
         self._notes.corners(step.end)
-        self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
+        self._notes.noise(arc, max(self._steps.settings.newton.tolerance, NOISY))
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[:2])
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
@@ -270,7 +284,7 @@ class Continuation:
     def _without_step(self, error: ConvergenceError) -> Iterator[Point]:
         """Yield the point at which no step was possible and end there, unless shorter steps are left to try."""
         here, first = self.here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
-        stop: Stop = met(self._watch.ends, here, first) or no_convergence(self.state, self.settings, error)
+        stop: Stop = met(self._watch.ends, here, first) or no_convergence(self.state, self._steps.settings, error)
         grazes = isinstance(error, Grazing)
         stop = self.state.system.explained(Stop(Reason.EVENT, str(error), event="grazing") if grazes else stop, here)
         if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
@@ -333,7 +347,7 @@ class Continuation:
 
     def _takes_shorter_steps(self) -> bool:
         """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""
-        shorter = shorter_steps(self.state, self.settings)
+        shorter = shorter_steps(self.state, self._steps.settings)
         if shorter is None:
             return False
         here, least = self.here()[self.primary], exact_text(self.settings.min_step)
@@ -345,7 +359,7 @@ class Continuation:
 
     def _step(self, state: State) -> Step | SpecialPoint:
         """Predict and correct, halving the step until the corrected point can be believed; or return the end of the branch."""
-        settings, (step, _, made), self._handed = self.settings, self._handed or (0.0, None, None), None
+        settings, (step, _, made), self._handed = self._steps.settings, self._handed or (0.0, None, None), None
         if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
             step, made = length_of(state, settings), None
         finest = max(settings.min_step, ROUGH * step)
@@ -389,7 +403,7 @@ class Continuation:
 
         No point is made. The step is made with outcomes that are not frozen, and frozen ones are found at its end.
         """
-        state, newton = self.state, self.settings.newton
+        state, newton = self.state, self._steps.settings.newton
         other = state.system.round_end(state.x, error)
         if other is None:
             return False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -73,6 +75,7 @@ _Found = tuple[Trial, Any, float]
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
+    One whose error is above that tolerance, as on a path that is less exact, is located on a mesh made for the tolerance first.
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
     is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
     and has no errors. Where halving the mesh no longer brings it much closer, it moves by round-off: its error is the larger of
@@ -84,7 +87,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     if finding_of(details).is_lost:
         return Refined(trial, errors, details, is_lost=True)
     try:
-        trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
+        found = _on_switches(point, (trial, details, 0.0), settings.newton)
+        trial, details, left = _on_better_mesh(point, found, settings)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
     is_lost = False
@@ -118,6 +122,28 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if np.all(settled):
             break
     return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
+
+
+def _on_better_mesh(point: SpecialPoint, found: _Found, settings: Settings) -> _Found:
+    """Return a special point on a mesh of more intervals that is made for the tolerance; as it is where that does not serve.
+
+    Interpolation moves a point along the branch. Where no equation holds its place, the mesh is only halved.
+    """
+    (trial, details, _), test, control = found, point.test, settings.mesh
+    system = trial.system
+    if test is None or finding_of(details).has_equations or not (system.intervals and np.isfinite(trial.tangent).all()):
+        return found
+    if not (test.holds_one_of(system.free) or trial.value(test)) or not trial.discretization_error > control.tolerance:
+        return found
+    fewest = min(system.intervals + 1, control.max_intervals)
+    made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=fewest))
+    if made is None or made[0].intervals <= system.intervals:
+        return found
+    with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
+        there = _on_switches(point, _again(point, trial, details, made, settings.newton), settings.newton)
+        x = there[0].x[there[0].system.state_size :]
+        return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else found
+    return found
 
 
 def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, settings: Settings) -> dict[str, float]:

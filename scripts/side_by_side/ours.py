@@ -41,6 +41,11 @@ def take_autos_tolerances() -> None:
         kind.__init__ = functools.partialmethod(_made_with, kind.__init__, name, value)
 
 
+def take_path_tolerance() -> None:
+    """Let this process run all demos with points between labelled ones, which are not compared, that are less exact."""
+    Settings.__init__ = functools.partialmethod(_made_with, Settings.__init__, "path_tolerance", 1e-8)
+
+
 def _made_with(made: object, init: Callable[..., None], name: str, value: object, *given: object, **named: object) -> None:
     """Make settings with one of their values, whatever a demo states of it."""
     init(made, *given, **named)

@@ -43,6 +43,18 @@ def test_a_layer_that_leaves_its_mesh_behind(degree, tolerance):
         assert point.discretization_error < tolerance or point.label
 
 
+def test_points_between_labelled_ones_may_be_less_exact():
+    """A layer has fewer intervals then; a value that is asked for, and both ends, are as exact as ever: closed form."""
+    start, asked = contin.solve(LAYER, [0.0], degree=4), {"c": [0.45]}
+    both = [contin.trace(start, free=["c"], limits={"c": (0.1, 0.8)}, zeros=asked, step=0.1, path_tolerance=path)
+            for path in (1e-8, None)]  # fmt: skip
+    coarse, fine = ([point for point in branch if not point.label] for branch in both)
+    assert max(map(layer_error, coarse)) < 3e-8 and max(point.discretization_error for point in coarse) < 1e-8
+    assert 2 * np.mean([each.system.intervals for each in coarse]) < np.mean([each.system.intervals for each in fine])
+    assert max(layer_error(point) for branch in both for point in branch if point.label) < 1e-11
+    assert [point.label for point in both[0] if point.label] == ["EP", "UZ", "EP"]
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("degree", "intervals"), [(2, 100), (3, 60), (4, 40), (4, 100), (5, 40), (7, 30)])
 def test_the_estimate_on_a_mesh_that_is_kept(degree, intervals):
