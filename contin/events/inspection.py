@@ -133,7 +133,11 @@ class Inspection:
         closed = self._closed()
         if closed is not None:
             found.insert(0, closed)  # the first point once more, which was labelled already
-        return _in_order(found)
+        order = sorted(found, key=lambda point: point.at)
+        group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
+        place = {id(point): number for point, number in zip(order, group)}
+        # at one place points without a test function and folds come first; others stay as they were found
+        return sorted(found, key=lambda point: (place[id(point)], point.test is not None and point.test.label != Label.FOLD))
 
     def _at_the_start(self, point: SpecialPoint) -> bool:
         """Return whether a special point is the first point of the run once more."""
@@ -372,14 +376,3 @@ def misses(value: float, first: float, rate: float, last: float, last_rate: floa
     """Return whether a parameter certainly does not take a value in a step, by its values and rates at both ends."""
     margin = step * max(abs(rate), abs(last_rate)) + APART * (1 + abs(value))
     return value < min(first, last) - margin or value > max(first, last) + margin
-
-
-def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
-    """Return special points in order of their places; of those at one place the ones without a test function and folds first.
-
-    Others stay as given.
-    """
-    order = sorted(points, key=lambda point: point.at)
-    group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
-    place = {id(point): number for point, number in zip(order, group)}
-    return sorted(points, key=lambda point: (place[id(point)], point.test is not None and point.test.label != Label.FOLD))
