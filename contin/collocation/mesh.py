@@ -186,8 +186,7 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
 
 def near(places: Array, breaks: Array, length: float) -> Array:
     """Return which places lie on a break."""
-    found: Any = (np.abs(places[:, None] - breaks) <= CORRECTED * length).any(axis=1)
-    return np.asarray(found)
+    return np.asarray((np.abs(places[:, None] - breaks) <= CORRECTED * length).any(axis=1))
 
 
 def with_breaks(mesh: Array, breaks: Array) -> Array:

@@ -68,14 +68,6 @@ class DoublingCurve(MultiplierCurve):
         """Return -1."""
         return -np.eye(1)
 
-    def coupling_slope(self, kappa: float) -> Array:
-        """Return nothing: there is no kappa."""
-        return np.empty((0, 1))
-
-    def imaginary_part(self, x: Array) -> float:
-        """Return 0: the multiplier is real."""
-        return 0.0
-
     def frequency(self, x: Array) -> float:
         """Return the angle of the multiplier -1."""
         return math.pi

@@ -176,10 +176,9 @@ class Solver:
     def _solved(self, matrix: Array, right: Array) -> Array:
         """Return the solution of the dense equations, shape (copies, :)."""
         try:
-            found: Any = np.linalg.solve(matrix, right.ravel()).reshape(right.shape)
+            return cast(Any, np.linalg.solve(matrix, right.ravel())).reshape(right.shape)
         except np.linalg.LinAlgError:
             return np.full(right.shape, np.nan)
-        return cast(Array, found)
 
 
 class Round:

@@ -64,17 +64,17 @@ class CriticalCurve(Defining):
     def coupling(self, kappa: float) -> Array:
         """Return P, shape (copies, copies)."""
 
-    @abstractmethod
     def imaginary_part(self, x: Array) -> float:
-        """Return r; 0 where the pair is real."""
+        """Return r; 0 where the pair, or the one multiplier, is real."""
+        return 0.0
 
     @abstractmethod
     def frequency(self, x: Array) -> float:
         """Return the imaginary part of the critical eigenvalue, or of the logarithm of the critical multiplier."""
 
-    @abstractmethod
     def coupling_slope(self, kappa: float) -> Array:
-        """Return dP/dkappa."""
+        """Return dP/dkappa; nothing where there is no kappa."""
+        return np.empty((0, 1))
 
     @abstractmethod
     def normal_form(self, x: Array) -> Coefficient:
@@ -120,8 +120,7 @@ class CriticalCurve(Defining):
 
     def own_values(self, x: Array) -> Array:
         """Return g."""
-        found: Bordered = self.at(x)[1]
-        return found.g[0]
+        return self.at(x)[1].g[0]
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""

@@ -119,8 +119,7 @@ class FoldCurve(Defining):
 
     def own_values(self, x: Array) -> Array:
         """Return g."""
-        found: Bordered = self.at(x)[0]
-        return found.g[0]
+        return self.at(x)[0].g[0]
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""
@@ -205,13 +204,11 @@ class BranchPointCurve(Defining):
 
     def borders_fit(self, x: Array) -> bool:
         """Return whether the kernel and its multipliers have not turned away from the borders."""
-        found: BorderedMatrix = self.at(x)
-        return found.fits
+        return self.at(x).fits
 
     def own_values(self, x: Array) -> Array:
         """Return g."""
-        found: BorderedMatrix = self.at(x)
-        return found.g
+        return self.at(x).g
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx; the second parameter does not move along the kernel."""
@@ -221,8 +218,7 @@ class BranchPointCurve(Defining):
 
     def own_vectors(self, x: Array) -> Array:
         """Return psi."""
-        found: BorderedMatrix = self.at(x)
-        return found.borders[1][None]
+        return self.at(x).borders[1][None]
 
 
 class ExtremumCurve(Defining):
@@ -253,18 +249,15 @@ class ExtremumCurve(Defining):
 
     def borders_fit(self, x: Array) -> bool:
         """Return whether the tangents have not turned away from the rows Phi."""
-        found: Stationarity = self.at(x)
-        return found.fits
+        return self.at(x).fits
 
     def own_values(self, x: Array) -> Array:
         """Return g."""
-        found: Stationarity = self.at(x)
-        return found.g
+        return self.at(x).g
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""
-        found: Stationarity = self.at(x)
-        return found.gradients()
+        return self.at(x).gradients()
 
     def events(self) -> list[Event]:
         """Return those of extrema in one parameter more: the derivative by the held parameter vanishes, too.
@@ -322,8 +315,7 @@ class EventCurve(Defining):
 
     def known(self, x: Array) -> Known | None:
         """Return the matrix M, where the gradient is taken on the solutions."""
-        found: _Solutions | None = self.at(x) if self._gradient is None else None
-        return None if found is None else found.known
+        return self.at(x).known if self._gradient is None else None
 
     def value(self, x: Array) -> float:
         """Return e at x."""

@@ -423,8 +423,7 @@ class Algebraic(Spectral, Composed):
     @property
     def small_equations(self) -> Batch | None:
         """The residual; None of kinds that are made of this one, whose equations may be others, and with a given Jacobian."""
-        known: Batch = self._residual
-        return known if type(self) is Algebraic and self.problem.jacobian is None else None
+        return self._residual if type(self) is Algebraic and self.problem.jacobian is None else None
 
     @property
     def starts_cycles(self) -> bool:

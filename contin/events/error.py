@@ -87,8 +87,7 @@ def _again(point: Solution, system: Discretization, carry: Carrier) -> Array:
     """Return the unknowns of a point on another mesh."""
     x, known = carry(point.x), finding_of(point.details)
     if known.has_equations:
-        there: Trial = known.again(system, carry, point.x, Newton()).there(system, carry(point.tangent))
-        return there.x
+        return known.again(system, carry, point.x, Newton()).there(system, carry(point.tangent)).x
     if _is_fold(point):
         return zero_again(system, x, carry(point.tangent), fold(point.column), Newton())[0].x
     if system.size == system.equations:
