@@ -8,7 +8,7 @@ knot that is on the left, the change from one line to the next.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from contin.functions.tape import Number, Tape
 
@@ -48,7 +48,7 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int], along: C
         return Outcomes(tuple(results), (), ())
     moves, zero = tape.reading([*results, *moving], moving), tape.constant(0.0)
     varies = tape.reading([*results, *along], along)
-    moved: dict[int, int] = {}
+    moved: dict[Any, Any] = {}
     known: dict[int, int] = {}
     numbers, origins = list[int](), list[int]()
 
@@ -66,6 +66,8 @@ def frozen(tape: Tape, results: Sequence[int], moving: Collection[int], along: C
     for place in tape.needed(results):
         name, operands, data = tape.operations[place]
         new = tuple(moved[operand] for operand in operands)
+        if name in ("root", "least") and new != operands:  # what is found by iteration reads other numbers then
+            data = (tape.moved_search(tape, data[0], moved), *data[1:])
         if varies[place] or not moves[place]:
             moved[place] = place if new == operands else tape.at(name, new, data)
         elif name in ("lt", "le"):

@@ -200,10 +200,10 @@ class Tape:
                 moved[place] = self.constant(data)
                 continue
             if name in ("root", "least"):
-                data = (self._moved_search(other, data[0], moved), *data[1:])
+                data = (self.moved_search(other, data[0], moved), *data[1:])
             moved[place] = self.at(name, tuple(moved[operand] for operand in operands), data)
 
-    def _moved_search(self, other: Tape, search: Any, moved: dict[Any, Any]) -> Any:
+    def moved_search(self, other: Tape, search: Any, moved: dict[Any, Any]) -> Any:
         """Return a search of another tape with places on this one."""
         if search not in moved:
             inner = dict(moved)

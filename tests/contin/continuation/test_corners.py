@@ -12,6 +12,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 import contin
 from contin import AlgebraicProblem, BoundaryValueProblem, Segment, SegmentedProblem, Settings, solve, trace
 from contin.lowlevel import Continuation
+from contin.lowlevel import root as inner_root
 
 
 def corners(branch):
@@ -508,3 +509,14 @@ def test_curves_in_two_parameters_say_where_they_meet_corners(kink):
     curve = contin.curve(fold, free=["a", "b"], limits={"b": (-3, 3), "a": (-9, 9)})
     told = [note for note in [*curve.notes, str(curve.stop)] if "a corner: max(p.b - 1, 0), line " in note]
     assert len(told) == 1 and (curve[-1]["b"] == 3 if kink < 1 else curve[-1]["b"] == pytest.approx(1, abs=1e-4))
+
+
+def test_what_is_found_by_iteration_may_read_a_corner():
+    """y + y^3 = max(x, 2 x) and y = a: x = -2 at a = -1, and x = 1 at a = 1."""
+
+    def residual(u, p):
+        force = max(u.x, 2 * u.x)
+        return (inner_root(lambda y: (y[0] + y[0] ** 3 - force,), [force])[0] - p.a,)
+
+    branch = followed(residual, ["x"], -1.0, [-2.0], -1, 1)
+    assert corners(branch) == [(0, "goes on")] and branch[-1]["x"] == pytest.approx(1, abs=1e-12)
