@@ -12,8 +12,6 @@ comes.
 test of this project counts them.
 """
 
-import math
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -28,7 +26,7 @@ carrier = contin.BoundaryValueProblem(
 )
 found = []
 t = np.linspace(-1, 1, 301)
-for k in (math.pi / 2, -math.pi / 2, math.pi, -math.pi):  # a half wave and a whole one, of either sign
+for k in np.pi / 2 * np.array([1, -1, 2, -2, 3, -3]):  # one to three half waves, of either sign
     guess = t, np.column_stack([np.sin(k * (t + 1)), k * np.cos(k * (t + 1))])
     while True:
         try:
