@@ -21,7 +21,7 @@ import numpy as np
 
 from contin.arrays import Array, Indices
 from contin.boundary.crossings import deciding, ends_of, highest, outcomes
-from contin.collocation.mesh import interpolation, moved_to_breaks
+from contin.collocation.mesh import halved, interpolation, moved_to_breaks
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Carrier, inner
@@ -84,10 +84,9 @@ def numbers(system: Any, x: Array) -> Numbers:
     """Return the numbers that decide the conditions of a solution, over a whole round of a cycle."""
 
     def made() -> Numbers:
-        nodes, there, cyclic = system.nodes, _there(system, x), system.is_cycle
-        t = np.sort(np.append(nodes, (nodes[1:] + nodes[:-1]) / 2))
+        there, cyclic, t = _there(system, x), system.is_cycle, halved(system.nodes)
         t = t[np.unique(np.round((t - t[0]) / np.ptp(t) / BESIDE), return_index=True)[1]]  # closer ones differ by round-off
-        t[-1] = nodes[-1]
+        t[-1] = system.mesh[-1]
         if cyclic:
             t = (t[:-1] + np.arange(system.order)[:, None]).ravel()
             t = np.concatenate([[t[-1] - system.order], t, [t[0] + system.order]])
@@ -284,8 +283,7 @@ def touch_ahead(state: State, step: float) -> SpecialPoint | None:
 @functools.cache
 def grazing() -> Event:
     """Return the test function of grazing points of equations that do not jump."""
-    asks = lambda arc: bool(_changes(arc).any())  # noqa: E731
-    return Event(Label.GRAZING, "grazing", lambda _: 1.0, asks=asks, search=_search)
+    return Event(Label.GRAZING, "grazing", lambda _: 1.0, asks=lambda arc: bool(_changes(arc).any()), search=_search)
 
 
 @functools.cache

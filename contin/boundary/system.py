@@ -31,7 +31,7 @@ from contin.boundary.grazing import clearance, grazing, jumping, touch_ahead
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
-from contin.collocation.mesh import MeshControl, adapted_mesh, basis, interpolation, moved_to_breaks, near, with_breaks
+from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near, with_breaks
 from contin.collocation.newton import Values, Workspace, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
@@ -248,7 +248,7 @@ class Collocation(Composed):
 
     def refined(self) -> tuple[Self, Carrier]:
         """Return the same problem with every interval halved, and the carrier."""
-        return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
+        return self.on_mesh(halved(self.mesh))
 
     def with_reference(self, x: Array) -> Self:
         """Return the same with x as the reference, where a kind of problem has one."""

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices
+from contin.collocation.mesh import halved
 from contin.functions.batch import Batch, Recorded
 from contin.functions.tape import Tape
 from contin.levels import CORRECTED
@@ -282,8 +283,7 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
         return largest(places[:, None] + (ends - places)[:, None] * _PARTS, places, which).max(axis=1)
 
     with np.errstate(all="ignore"):
-        nodes = system.nodes
-        times = np.sort(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) / 2]))
+        times = halved(system.nodes)
         a, b, which = brackets(times, sides(times))
         if not a.size:
             return NOWHERE

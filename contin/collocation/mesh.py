@@ -184,6 +184,11 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     return both.max(axis=0) ** (1 / (d + 1))
 
 
+def halved(mesh: Array) -> Array:
+    """Return places in order, and the middles between them."""
+    return np.sort(np.append(mesh, (mesh[1:] + mesh[:-1]) / 2))
+
+
 def near(places: Array, breaks: Array, length: float) -> Array:
     """Return which places lie on a break."""
     return np.asarray((np.abs(places[:, None] - breaks) <= CORRECTED * length).any(axis=1))

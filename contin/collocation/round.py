@@ -188,11 +188,11 @@ def _condense(room: Monodromy) -> None:
                     for b in range(n):
                         room.part[q, a, b] = 0.0
                 for m in range(d):
-                    share = 1.0 if parts > 1 or m == q else 0.0
-                    for k in range(d if parts > 1 else 0):
+                    share = 1.0
+                    for k in range(d):
                         place = (i + room.points[q]) / parts - room.points[k]
                         share *= place / (room.points[m] - room.points[k]) if k != m else 1.0
-                    for a in range(n if share != 0.0 else 0):
+                    for a in range(n):
                         for b in range(n):
                             room.part[q, a, b] += share * room.jacobian[j * d + m, a, b]
             matrices = room.matrices[first + i : first + i + 1]

@@ -216,10 +216,8 @@ class MeshPolicy:
             if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break
             other = finer(end.system, end.x, accuracy.error, control)
-            if (
-                other is not None and not end.system.outcomes.size
-            ):  # the end has mesh points where it meets corners, the state others
-                mesh = other[0]
+            if other is not None and not end.system.outcomes.size:
+                mesh = other[0]  # it has points where the end meets corners; the state has others
                 mesh = (mesh.on_switches(run.state.system.carrier(mesh)(run.state.x)) or other)[0]
                 other = mesh, run.state.system.carrier(mesh)
             if other is None or not run.go_on(self.moved(run.state, run.here, other)):

@@ -187,24 +187,23 @@ def multipliers_ask(
         spectra.moved[0] = math.inf
     for a in range(spectra.real.shape[1]):
         spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
-    for turn in range(LAST + 1):  # the end, places inside, and the end again, so that values are those there
-        if turn > 0:
-            fill_place(spectra, turn)
-            one_call.evaluate(codes, mesh, values, new if turn == LAST else spectra.place, True)
-        if turn < LAST and clear:
-            clear = _keeps(room, spectra, values.jacobian, turn or LAST)
-        if turn == 0:
-            if not clear or (longer > 0.0 and crosses(spectra)):
-                return ASK
-            if longer == 0.0:
-                return AWAY
-            if not may_cross_between(spectra, longer, before):
-                break
-            rate = step / max(attempt.judged[rules.COSINE], LEAST_COSINE)
-            fill_cubic(spectra, x, path.tangents[number - 1], new, path.tangents[number], step, rate)
-        elif turn == LAST:
-            for i in range(x.size):
-                values.at[i] = new[i]
-            if not clear or passes_inside(spectra, True, True):
-                return ASK
+    if not _keeps(room, spectra, values.jacobian, LAST):
+        return ASK
+    if longer == 0.0:
+        return AWAY
+    if crosses(spectra):
+        return ASK
+    if may_cross_between(spectra, longer, before):
+        rate = step / max(attempt.judged[rules.COSINE], LEAST_COSINE)
+        fill_cubic(spectra, x, path.tangents[number - 1], new, path.tangents[number], step, rate)
+        for place in range(FIRST + 1, LAST):
+            if clear:
+                fill_place(spectra, place)
+                one_call.evaluate(codes, mesh, values, spectra.place, True)
+                clear = _keeps(room, spectra, values.jacobian, place)
+        one_call.evaluate(codes, mesh, values, new, True)  # values are those at the end again
+        for i in range(x.size):
+            values.at[i] = new[i]
+        if not clear or passes_inside(spectra, True, True):
+            return ASK
     return AWAY if keep_off_one(spectra, longer) else MAY_BRANCH

@@ -92,7 +92,8 @@ def floquet(
     finer: Any
     finer, carry = system.refined()  # type: ignore[misc]  # there is a mesh
     try:
-        again, along = _corrected(finer, carry(x), carry(tangent)), carry(tangent)
+        along = carry(tangent)
+        again = _corrected(finer, carry(x), along)
         if (moved := finer.on_switches(again, closely=True)) is not None:  # they depend on the places of corners themselves
             finer, carry = moved
             again = _corrected(finer, carry(again), carry(along))
@@ -185,8 +186,8 @@ def doubling(order: int = 1) -> Event:
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
     label, name = (Label.PERIOD_DOUBLING, "period doubling") if order % 2 else (Label.BRANCH_POINT, "symmetry breaking")
-    given: Any = {"search": _doublings, "asks": _may_double, "normal_form": flip}
-    return Event(label, name, _antiperiodic, describe=lambda trial: {"frequency": math.pi, "pairs": 1}, **given)
+    return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, normal_form=flip,
+                 describe=lambda trial: {"frequency": math.pi, "pairs": 1})  # fmt: skip
 
 
 def _antiperiodic(trial: Trial) -> float:
