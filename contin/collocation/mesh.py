@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -39,6 +40,11 @@ class Basis:
     constant: float
 
     __repr__ = shown
+
+    @functools.cached_property
+    def round_off(self) -> float:
+        """What round-off of values up to 1 makes of a difference of d-th derivatives."""
+        return float(2 * sys.float_info.epsilon * np.abs(self.highest).sum())
 
     @functools.cached_property
     def runge_kutta(self) -> Array:
@@ -159,7 +165,8 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     """Return the (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
 
     The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
-    each component scaled by max(1, max |u|).
+    each component scaled by max(1, max |u|). Where it is no more anywhere than what round-off of the values makes of it, as for
+    a constant solution, it is the same everywhere: the mesh has equal intervals, and does not follow noise.
 
     - ``basis`` (Basis)
     - ``mesh`` (ndarray, shape (N + 1,))
@@ -181,7 +188,10 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
-    return both.max(axis=0) ** (1 / (d + 1))
+    largest = both.max(axis=0)
+    if (largest * h ** (d + 1)).max() <= basis.round_off:
+        return np.full(h.size, basis.round_off ** (1 / (d + 1)) / h.mean())
+    return np.asarray(largest ** (1 / (d + 1)))
 
 
 def halved(mesh: Array) -> Array:
@@ -262,10 +272,7 @@ def _raised(phi: Array, h: Array) -> Array:
 def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _NOWHERE) -> Array:
     """Return a mesh whose intervals have equal shares of the density; between breaks, which are mesh points, about equal."""
     h = np.diff(mesh)
-    total = phi @ h
-    if not total > 0:
-        return with_breaks(np.linspace(mesh[0], mesh[-1], intervals + 1), breaks)
-    share = np.concatenate([[0.0], np.cumsum(phi * h)]) / total
+    share = np.concatenate([[0.0], np.cumsum(phi * h)]) / (phi @ h)
     places = np.linspace(0, 1, intervals + 1)
     if len(breaks):
         ends = np.concatenate([[0.0], np.interp(breaks, mesh, share), [1.0]])
