@@ -1,7 +1,7 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
     python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [small]
-                            [threads] [defaults] [problems] [--quick] [--out DIR] [--before DIR]
+                            [threads] [defaults] [problems] [accuracy] [--quick] [--out DIR] [--before DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -36,6 +36,7 @@ PARTS = (
     "threads",
     "defaults",
     "problems",
+    "accuracy",
 )
 
 
@@ -71,14 +72,16 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, options: argparse.Namespace) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress, threads
+    from benchmarks import accuracy, cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
+    from benchmarks import threads as blas
 
     from ribbon_model import exact
 
     quick = options.quick
     if part == "problems":
         return problems.run(quick, options.before, options.before_python)
-    plain = {each.__name__.partition(".")[2]: each for each in (cost, startup, many, stress, cycles, small, threads, defaults)}
+    plain = (cost, startup, many, stress, cycles, small, blas, defaults, accuracy)
+    plain = {each.__name__.partition(".")[2]: each for each in plain}
     if part in plain:
         return plain[part].run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n

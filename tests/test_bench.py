@@ -8,9 +8,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cores, cost, cycles, defaults, fold, many, problems, report, startup  # noqa: E402
+from benchmarks import accuracy, cores, cost, cycles, defaults, fold, many, problems, report, startup  # noqa: E402
 from benchmarks.statements import LARGE, NEWCOMERS, VARIATIONAL, Statement  # noqa: E402
-from peers import auto_07p, scipy_bvp  # noqa: E402
+from peers import auto_07p, scipy_bvp, scipy_small  # noqa: E402
 
 BRANCH_FILE = """\
    0   PT  TY  LAB    kappa_n       L2-NORM        MAX M1
@@ -100,6 +100,21 @@ def test_jacobian_given_to_solve_bvp_is_exact():
         e = 1e-6 * np.eye(3)[j]
         difference = (scipy_bvp.rhs(0, q, p + e) - scipy_bvp.rhs(0, q, p - e)) / 2e-6
         np.testing.assert_allclose(by_parameters[:, j], difference, atol=1e-8)
+
+
+def test_solve_bvp_is_driven_to_the_same_numbers():
+    """Bratu's fold in closed form; r of a cycle of Lorenz's equations by shooting. Both to what its tolerance 1e-5 gives."""
+    assert scipy_small.bratu(1e-5) == pytest.approx(accuracy._exact_fold(), rel=1e-6)
+    assert scipy_small.lorenz(1e-5) == pytest.approx(accuracy._exact_cycle(), rel=1e-6)
+
+
+def test_the_picture_of_errors_against_time():
+    """Two panels, and a third where the fold of (1, 2) was measured too; a program that is missing leaves a gap."""
+    rows = [{"tool": "contin", "setting": "", "seconds": 0.01 * n, "error": 10.0**-n} for n in range(3, 13)]
+    results = {"problems": {name: {"rows": rows, "best": fold.best(rows), "exact": 1.0} for name in ("one", "other")}}
+    assert "| one | contin | 60.0 ms | 80.0 ms | 100.0 ms | 120.0 ms |" in accuracy.table(results)
+    of_fold = {"rows": [row | {"tool": fold.CELL} for row in rows], "exact_fold": 4.0}
+    assert [len(report._accuracy(results, other).axes) for other in (None, of_fold)] == [2, 3]
 
 
 def test_the_table_of_many_branches():

@@ -73,7 +73,7 @@ def _followed(name: str, hopf: contin.Point, mesh: contin.MeshControl, newton: c
 def _by_auto(name: str, last: float, step: float, settings: dict) -> dict:
     found = auto_cycles.study(name, last, step, **settings)
     seconds = min(found["seconds"], found["processor_seconds"])  # the second one includes the start of the process
-    return {"seconds": seconds, "points": found["points"], "parameter": found["labels"][-1][1]}
+    return {"seconds": seconds, "points": found["points"], "parameter": found["parameter"]}
 
 
 def _summary(runs: list[dict], exact: float) -> dict:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress, threads
+from benchmarks import accuracy, cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
+from benchmarks import threads as blas
 from contin.lowlevel import PALETTE
 
 TITLES = {
@@ -23,6 +24,7 @@ TITLES = {
     "threads": "Threads of BLAS",
     "defaults": "Default degree",
     "problems": "New problems",
+    "accuracy": "Error against time",
 }
 TABLES = {
     "like-for-like": like_for_like.table,
@@ -34,9 +36,10 @@ TABLES = {
     "cores": cores.table,
     "cycles": cycles.table,
     "small": small.table,
-    "threads": threads.table,
+    "threads": blas.table,
     "defaults": defaults.table,
     "problems": problems.table,
+    "accuracy": accuracy.table,
 }
 
 
@@ -100,6 +103,8 @@ def pictures(results: dict, folder: Path) -> list[Path]:
     for part, (name, draw) in drawers.items():
         if part in results:
             paths.append(_saved(draw(results[part]), folder / name))
+    if "accuracy" in results:
+        paths.append(_saved(_accuracy(results["accuracy"], results.get("fold")), folder / "bench-accuracy.png"))
     if "cost" in results:
         paths.append(_saved(_errors(results["cost"]["errors"]), folder / "bench-errors.png"))
     return paths
@@ -125,16 +130,47 @@ def _fold(results):
         figure.subplots(1, 2, sharey=True), ("seconds", "process_seconds"), ("in the process, warm", "whole processes")
     ):
         for number, tool in enumerate(tools):
-            places = sorted((row[key], max(row["error"], 1e-16)) for row in results["rows"] if row["tool"] == tool)
-            colour, marker = PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
-            axes.loglog(*zip(*places), marker, color=colour, alpha=0.3, markersize=3)
-            best = [place for at, place in enumerate(places) if place[1] < min((e for _, e in places[:at]), default=np.inf)]
-            axes.loglog(*zip(*best), f"{marker}-", color=colour, label=tool, markersize=4)
+            _front(axes, [(row[key], max(row["error"], 1e-16)) for row in results["rows"] if row["tool"] == tool], number, tool)
         axes.set(xlabel=f"seconds, {title}", title=title)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("error of $\\kappa_n$ at the fold of (1, 2)")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
     return figure
+
+
+def _accuracy(results, of_fold):
+    """The problems of `benchmarks.accuracy`, and the fold of (1, 2) where that part was run, too."""
+    from matplotlib.figure import Figure
+
+    panels = {problem: found["rows"] for problem, found in results["problems"].items()}
+    if of_fold is not None:
+        tools = {fold.CELL: accuracy.CONTIN, fold.AUTO_CELL: accuracy.AUTO, fold.SCIPY: accuracy.SCIPY}
+        rows = [row for row in of_fold["rows"] if row["tool"] in tools]
+        panels["the fold of a ribbon"] = [
+            row | {"tool": tools[row["tool"]], "error": max(row["error"] / of_fold["exact_fold"], 1e-15)} for row in rows
+        ]
+    figure = Figure(figsize=(1 + 4 * len(panels), 3.6), layout="constrained")
+    for axes, (problem, rows) in zip(figure.subplots(1, len(panels), sharey=True), panels.items()):
+        for number, tool in enumerate((accuracy.CONTIN, accuracy.AUTO, accuracy.SCIPY)):
+            _front(axes, [(1e3 * row["seconds"], row["error"]) for row in rows if row["tool"] == tool], number, tool)
+        (low, high), ticks = axes.get_xlim(), (digit * decade for decade in (0.1, 1, 10, 100, 1000) for digit in (1, 2, 5))
+        _plain(axes.xaxis, [tick for tick in ticks if low < tick < high])
+        axes.set(xlabel="time, ms", title=problem)
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("relative error of the parameter")
+    figure.axes[0].legend(fontsize=8, loc="lower left")
+    return figure
+
+
+def _front(axes, places, number, tool):
+    """Draw all settings of a tool, and a line through those that no faster one beats."""
+    places = sorted(places)
+    colour, marker = PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
+    best = [place for at, place in enumerate(places) if place[1] < min((e for _, e in places[:at]), default=np.inf)]
+    axes.set(xscale="log", yscale="log")
+    for some, style, strength in ((places, marker, 0.3), (best, f"{marker}-", 1.0)):
+        if some:
+            axes.plot(*zip(*some), style, color=colour, alpha=strength, markersize=4, label=tool if some is best else None)
 
 
 def _cost(results):

@@ -2,7 +2,7 @@
 
 The Fortran files in ``auto/`` state the ribbon three times, with analytic Jacobians: ``half`` and ``loop`` in all thirteen
 components of equations (1)-(4) of Audoly & Seffen (2015), ``cell`` in the four of the quarter wave. A study is two runs: the
-planar circle up to its bifurcation at kappa_n = 2.5, then the branch that leaves there.
+planar circle up to its bifurcation at kappa_n = 2.5, then the branch that leaves there. ``bratu`` is Bratu's problem.
 """
 
 from __future__ import annotations
@@ -93,8 +93,23 @@ def study(
     }  # fmt: skip
 
 
-def _run(program: Path, folder: Path, constants: str, trace: bool = True) -> dict:
-    """Run AUTO once in a folder that may hold a restart file; ``trace`` says that the program writes fort.97."""
+def bratu(intervals: int, degree: int, tolerance: float, longest_step: float) -> dict:
+    """Follow Bratu's problem from u = 0 to its fold; ``fold`` is in full precision."""
+    values = {"ndim": 2, "nbc": 2, "free": "1", "restart": 0, "switch": 1, "folds": 1, "branch_points": 0, "stop": "LP1",
+              "intervals": intervals, "degree": degree, "tolerance": tolerance, "event_tolerance": 10 * tolerance,
+              "longest_step": longest_step, "first_step": 0.1, "diagnostics": 0}  # fmt: skip
+    with tempfile.TemporaryDirectory(prefix="bench-auto-") as name:
+        found = _run(build("bratu")[0], Path(name), CONSTANTS.format(**values))
+    return found | {"fold": in_full(found)}
+
+
+def in_full(found: dict) -> float:
+    """Return the first free parameter at the last label of a run in full precision."""
+    return min((row[0] for row in found["trace"]), key=lambda value: abs(value - found["labels"][-1][1]))
+
+
+def _run(program: Path, folder: Path, constants: str) -> dict:
+    """Run AUTO once in a folder that may hold a restart file."""
     (folder / "fort.2").write_text(constants)
     (folder / "fort.97").unlink(missing_ok=True)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
@@ -103,7 +118,7 @@ def _run(program: Path, folder: Path, constants: str, trace: bool = True) -> dic
     elapsed, used = time.perf_counter() - began, _processor_seconds() - used
     if done.returncode:
         raise RuntimeError(f"AUTO-07p failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
-    written = (folder / "fort.97").read_text() if trace else ""
+    written = (folder / "fort.97").read_text()
     parsed = parse((folder / "fort.7").read_text(), (folder / "fort.9").read_text(), done.stdout)
     rows = [tuple(map(float, line.split())) for line in written.splitlines()]
     return parsed | {"process_seconds": elapsed, "processor_seconds": used, "trace": rows}

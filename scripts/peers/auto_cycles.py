@@ -37,7 +37,12 @@ PROGRAM = """\
       END SUBROUTINE ICND
       SUBROUTINE FOPT
       END SUBROUTINE FOPT
-      SUBROUTINE PVLS
+      SUBROUTINE PVLS(NDIM,U,PAR)
+      IMPLICIT NONE
+      INTEGER, INTENT(IN) :: NDIM
+      DOUBLE PRECISION, INTENT(IN) :: U(NDIM)
+      DOUBLE PRECISION, INTENT(INOUT) :: PAR(*)
+      WRITE(97,'(ES25.16)') PAR(1)
       END SUBROUTINE PVLS
 """
 #: The statements of each vector field, parted by semicolons, and the number of states; U(3) is z, PAR(1) the parameter.
@@ -84,14 +89,18 @@ def _lines(text: str) -> str:
 
 
 def study(name: str, last: float, step: float, *, intervals: int, degree: int, tolerance: float) -> dict:
-    """Follow the equilibrium to its Hopf point, and the cycles to the period ``last``; return what is known of these."""
+    """Follow the equilibrium to its Hopf point, and the cycles to the period ``last``; return what is known of these.
+
+    ``parameter`` is that at the last cycle in full precision (AUTO's own files keep eleven digits).
+    """
     values = {"states": FIELDS[name]["states"], "intervals": intervals, "degree": degree}
     values |= {"tolerance": tolerance, "event_tolerance": 10 * tolerance}
     with tempfile.TemporaryDirectory(prefix="bench-auto-") as place:
         folder = Path(place)
         first = {"kind": 1, "restart": 0, "free": "1", "step": step, "longest_step": 0.5, "stop": "SP=['HB1']"}
-        auto_07p._run(build(name), folder, CONSTANTS.format(**values, **first), trace=False)
+        auto_07p._run(build(name), folder, CONSTANTS.format(**values, **first))
         (folder / "fort.8").replace(folder / "fort.3")
         second = {"kind": 2, "restart": 2, "free": "1, 11", "step": 0.1, "longest_step": 0.5}
         stop = f"UZSTOP={{11: {last}}}"
-        return auto_07p._run(build(name), folder, CONSTANTS.format(**values, **second, stop=stop), trace=False)
+        found = auto_07p._run(build(name), folder, CONSTANTS.format(**values, **second, stop=stop))
+    return found | {"parameter": auto_07p.in_full(found)}
