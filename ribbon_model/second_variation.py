@@ -166,20 +166,20 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     p = parameters
     moment = np.array([p["M1"], p["M2"], p.get("M3", 0.0)])
     force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
-    axes, directors, symmetry = _UNFOLDED[domain](sample, p["length"])
-    loads, known = (axes @ moment, axes @ force), {name: p[name] for name in law.parameters}
-    inside = frames((tables.value @ local).reshape(-1, 4)).reshape(*local.shape[:1], degree, 3, 3) @ axes.T
+    there = frames(np.concatenate([quaternions[[0, -1]], (tables.value @ local).reshape(-1, 4)]))
+    axes, directors, symmetry = _UNFOLDED[domain](sample, there[0], there[1], p["length"])
+    loads, inside = (axes @ moment, axes @ force), there[2:].reshape(*local.shape[:1], degree, 3, 3) @ axes.T
+    known = {name: p[name] for name in law.parameters}
     return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, inside)
 
 
-def _whole(sample, length):
+def _whole(sample, first, last, length):
     """Return the lab axes (rows), directors and symmetry of a loop of which no symmetry is known."""
     return np.eye(3), lambda stations: sample(np.mod(stations, LENGTH) / LENGTH), Symmetry()
 
 
-def _unfolded_half(between_axes: bool, sample, length):
+def _unfolded_half(between_axes: bool, sample, first, last, length):
     """Return lab axes, directors and symmetry of a half loop between mirrors, or between two-fold axes."""
-    first = sample(np.zeros(1))[0]
     axes = np.array([first[1], first[2], first[0]] if between_axes else [first[2], -first[1], first[0]])
     image = np.diag([1.0, -1.0, -1.0]) if between_axes else np.diag([-1.0, 1.0, 1.0])
     signs = np.array([-1.0, 1.0, -1.0] if between_axes else [1.0, 1.0, -1.0])
@@ -194,9 +194,8 @@ def _unfolded_half(between_axes: bool, sample, length):
     return axes, directors, Symmetry(mirror=not between_axes, axis=between_axes)
 
 
-def _unfolded_cell(sample, length):
+def _unfolded_cell(sample, first, last, length):
     """Return lab axes, directors and symmetry of a quarter wave: its image under the axis d2 at its end, then half waves."""
-    first, last = sample(np.array([0.0, 1.0]))
     normal = cross_matrix(first[2]) @ last[1]
     if np.linalg.norm(normal) < levels.APART:  # no rotation from part to part, so any axis in the mirror plane can be taken
         normal = first[0]
@@ -224,7 +223,8 @@ def _unfolded_cell(sample, length):
     return axes, directors, Symmetry(order, round(winding) % order, flip=True, mirror=True)
 
 
-#: Functions that unfold a solution on a domain: ``(axes, directors, symmetry)`` from its directors and its length.
+#: Functions that unfold a solution on a domain: ``(axes, directors, symmetry)`` from its directors, those at both its ends, and
+#: its length.
 _UNFOLDED: dict[Domain, Callable] = {
     CELL: _unfolded_cell, HALF_LOOP: functools.partial(_unfolded_half, False),
     HALF_LOOP_BETWEEN_AXES: functools.partial(_unfolded_half, True), LOOP: _whole,

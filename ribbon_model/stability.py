@@ -32,7 +32,6 @@ Steps:
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -251,15 +250,36 @@ def _phases(symmetry: Symmetry) -> np.ndarray:
 
 
 @functools.cache
-def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Z (6, 6) and rows (c, 6) of a class: E(0) = Z D for the increment D of E over a part, and rows . D = 0.
+def _closing(symmetry: Symmetry) -> tuple[np.ndarray, np.ndarray]:
+    """Return Z (J, 6, 6) and rows (J, c, 6) of all classes j: E(0) = Z D, D the increment of E over a part, and rows . D = 0.
 
-    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which has no effect.
+    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which has no effect. Rows beyond
+    those that a class has are zero.
     """
-    phases = (wavenumber + _phases(symmetry)) % symmetry.order
-    factors = np.exp(2j * np.pi * phases / symmetry.order) - 1
-    inverse = np.where(phases == 0, 0, 1 / np.where(phases == 0, 1, factors))
-    return _CIRCULAR.conj().T @ (inverse[:, None] * _CIRCULAR), _CIRCULAR[phases == 0]
+    phases = (np.arange(symmetry.order // 2 + 1)[:, None] + _phases(symmetry)) % symmetry.order
+    factors, rigid = np.exp(2j * np.pi * phases / symmetry.order) - 1, phases == 0
+    inverse = np.where(rigid, 0, 1 / np.where(rigid, 1, factors))
+    first = np.argsort(~rigid, axis=1, kind="stable")[:, : max(rigid.sum(axis=1).max(), 1)]
+    rows = _CIRCULAR[first] * np.take_along_axis(rigid, first, axis=1)[:, :, None]
+    return _CIRCULAR.conj().T @ (inverse[:, :, None] * _CIRCULAR), rows
+
+
+#: Kinds of unknowns of a part of the loop: those with one sign under the reversal, with the other one, or both.
+_FIRST, _SECOND, _BOTH = range(3)
+
+
+@functools.cache
+def _kinds(symmetry: Symmetry) -> dict[tuple[int, str], int]:
+    """Return the kind of unknowns of each class, by its name: all are of the first one where nothing reverses the loop."""
+    kinds = {}
+    for j in range(symmetry.order // 2 + 1):
+        if not symmetry.reverses:
+            kinds[j, ""] = _FIRST
+        elif 2 * j % symmetry.order:
+            kinds[j, ""] = _BOTH
+        else:
+            kinds[j, "even"], kinds[j, "odd"] = (_FIRST, _SECOND) if j == 0 else (_SECOND, _FIRST)
+    return kinds
 
 
 def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
@@ -322,52 +342,52 @@ class _Form:
 
     def classes(self) -> tuple[SymmetryClass, ...]:
         """Return every class; set ``residual``."""
-        symmetry, found = self.symmetry, []
-        for j in range(symmetry.order // 2 + 1):
-            own = 2 * j % symmetry.order == 0
-            for parity in ("even", "odd") if own and symmetry.reverses else ("",):
-                form, increments = self._part(j, parity)
-                known = self.motion if j == 0 and parity != "even" else np.zeros(len(form))
-                found.append(SymmetryClass(j, parity, 1 if own else 2, self._eigenvalues(form, increments, j, known)))
-        return tuple(found)
+        n, (forms, rows), kinds = len(self.motion), self._parts(), _kinds(self.symmetry)
+        unknowns, found = (slice(0, n), slice(n, 2 * n), slice(0, 2 * n)), dict[tuple[int, str], np.ndarray]()
+        for some in ([name for name in kinds if (kinds[name] == _BOTH) == both] for both in (False, True)):
+            if some:
+                parts = [(j, unknowns[kinds[j, parity]]) for j, parity in some]
+                known = np.zeros((len(some), len(rows[0, 0, parts[0][1]])))
+                for shift, (j, parity) in zip(known, some):
+                    shift += self.motion if j == 0 and parity != "even" else 0.0
+                given = np.array([forms[j, part, part] for j, part in parts]), np.array([rows[j, :, part] for j, part in parts])
+                values, residual = _spectra(*given, known)
+                found |= zip(some, values)
+                self.residual = max(self.residual, residual)
+        return tuple(SymmetryClass(*name, 2 if kinds[name] == _BOTH else 1, found[name]) for name in kinds)
 
-    def _part(self, j: int, parity: str):
-        """Return the matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
+    def _parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the matrices of all wavenumbers on a part of the loop (J, m, m), and their conditions of closure (J, c, m).
 
-        With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``). Without a parity both kinds
-        are unknowns, the second times i, which makes the matrix real.
+        With a reversal, v on the image of the piece is v on it times 1 or -1. Both kinds are unknowns, the second times i,
+        which makes the matrix real; in a class with a parity they do not couple.
         """
-        if not self.symmetry.reverses:
-            return self.matrix, self.increments
-        image = _motion(self.symmetry) @ _reversal(self.symmetry)
-        across = self.increments.T @ (self.coupling @ image) @ self.increments / 2
-        reflected = image @ self.increments
-        if parity:
-            sign = (1 if parity == "even" else -1) * (1 if j == 0 else -1)
-            return self.matrix + sign * across, (self.increments + sign * reflected) * np.sqrt(0.5)
-        n = len(self.matrix)
-        form = np.zeros((2 * n, 2 * n))
-        form[:n, :n], form[n:, n:] = self.matrix + across, self.matrix - across
-        return form, np.hstack([self.increments + reflected, 1j * (self.increments - reflected)]) * np.sqrt(0.5)
+        form, increments, (closing, rows) = self.matrix, self.increments, _closing(self.symmetry)
+        if self.symmetry.reverses:
+            n, image = len(form), _motion(self.symmetry) @ _reversal(self.symmetry)
+            across, reflected = increments.T @ (self.coupling @ image) @ increments / 2, image @ increments
+            form = np.zeros((2 * n, 2 * n))
+            form[:n, :n], form[n:, n:] = self.matrix + across, self.matrix - across
+            increments = np.hstack([increments + reflected, 1j * (increments - reflected)]) * np.sqrt(0.5)
+        closing = closing.conj().transpose(0, 2, 1) @ self.coupling
+        forms = form + (increments.conj().T @ ((closing + closing.conj().transpose(0, 2, 1)) / 2) @ increments).real
+        conditions = rows @ increments
+        return forms, np.concatenate([conditions.real, conditions.imag], axis=1)
 
-    def _eigenvalues(self, form, increments, j: int, known):
-        """Return the eigenvalues of a class under the conditions of closure, without the shift of phase ``known``."""
-        closing, rows = _closing(self.symmetry, j)
-        closing = closing.conj().T @ self.coupling
-        form = form + (increments.conj().T @ ((closing + closing.conj().T) / 2 @ increments)).real
-        out = np.empty((len(form), 0))
-        if len(rows):
-            rows = rows @ increments
-            _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
-            out = rows[sizes > levels.DEPENDENT].T
-            known = known - out @ (out.T @ known)
-        size = math.sqrt(known @ known)
-        if size > levels.DOUBLED:
-            known = known / size
-            self.residual = max(self.residual, abs(float(known @ form @ known)))
-            out = np.column_stack([out, known])
-        if out.size:  # between the projectors, and the identity on what they project out
-            image = form @ out
-            crossed = image @ out.T
-            form = form - crossed - crossed.T + out @ (out.T @ image + np.eye(out.shape[1])) @ out.T
-        return np.linalg.eigvalsh(form)
+
+def _spectra(forms, rows, known) -> tuple[np.ndarray, float]:
+    """Return eigenvalues (K, n) of forms (K, n, n) under conditions (K, c, n), without known directions (K, n).
+
+    The number is the largest of |Q| along a direction that is known to be a zero.
+    """
+    _, sizes, out = np.linalg.svd(rows, full_matrices=False)
+    out = out * (sizes > levels.DEPENDENT)[:, :, None]
+    known = known - (known[:, None] @ out.transpose(0, 2, 1) @ out)[:, 0]
+    size = np.sqrt((known * known).sum(axis=1, keepdims=True))
+    known = np.where(size > levels.DOUBLED, known / np.maximum(size, levels.DOUBLED), 0.0)[:, None]
+    residual = float(np.abs(known @ forms @ known.transpose(0, 2, 1)).max())
+    out = np.concatenate([out, known], axis=1)  # between the projectors, and the identity on what they project out
+    image = forms @ out.transpose(0, 2, 1)
+    crossed = image @ out
+    within = out.transpose(0, 2, 1) @ (out @ image + np.eye(out.shape[1])) @ out
+    return np.linalg.eigvalsh(forms - crossed - crossed.transpose(0, 2, 1) + within), residual

@@ -51,8 +51,9 @@ class SymmetryWatch(Watch):
         self._known: dict = {}
         self._margin = margin(law)
         self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
-        names = [entry.name for entry in self.at(system, x).classes]
-        self.monitors = [self._monitor(name) for name in names if name != _FULL]
+        self._step: tuple = None, None, set()  # both ends of the last one, and what may pass zero inside
+        self._names = {entry.name for entry in self.at(system, x).classes}
+        self.monitors = [self._monitor(name) for name in sorted(self._names - {_FULL})]
 
     def at(self, system, x, point=None) -> Stability:
         """Return the stability of a state; for a ``point`` of the branch (with tangent) on the mesh that the index needs."""
@@ -143,20 +144,29 @@ class SymmetryWatch(Watch):
                 values = values[np.abs(values) > levels.APART]
             return float(np.prod(values))
 
-        def may_pass(arc) -> bool:
-            try:
-                ends = [self._within_law(trial.system, trial.x, trial) for trial in (arc.before, arc.trial)]
-            except ValueError:
-                return True
-            if None in ends:
-                return True
-            first, last = (end[name].eigenvalues for end in ends)
-            if len(first) != len(last):  # another number of intervals was condensed
-                return True
-            return bool(np.any(np.abs(last - first) > _MOVES * np.minimum(np.abs(first), np.abs(last))))
-
         mode = Mode(self._n, *name)
-        return Event(LABEL, str(mode), determinant, looks=_LOOKS, asks=may_pass, describe=lambda trial: mode)
+        return Event(
+            LABEL, str(mode), determinant, looks=_LOOKS, asks=lambda arc: name in self._moved(arc), describe=lambda trial: mode
+        )
+
+    def _moved(self, arc) -> set:
+        """Return the classes with an eigenvalue that may pass zero inside a step, looked for once a step."""
+        if self._step[0] is not arc.before or self._step[1] is not arc.trial:
+            self._step = arc.before, arc.trial, self._moving(arc)
+        return self._step[2]
+
+    def _moving(self, arc) -> set:
+        try:
+            ends = [self._within_law(trial.system, trial.x, trial) for trial in (arc.before, arc.trial)]
+        except ValueError:
+            return self._names
+        if None in ends:
+            return self._names
+        both = [(before.name, before.eigenvalues, after.eigenvalues) for before, after in zip(*(end.classes for end in ends))]
+        return {
+            name for name, first, last in both  # where another number of intervals was condensed, there are others
+            if len(first) != len(last) or np.any(np.abs(last - first) > _MOVES * np.minimum(np.abs(first), np.abs(last)))
+        }  # fmt: skip
 
 
 def _broken(point) -> tuple[int, str]:

@@ -149,7 +149,7 @@ def _accuracy(results, of_fold):
         panels["the fold of a ribbon"] = [
             row | {"tool": tools[row["tool"]], "error": max(row["error"] / of_fold["exact_fold"], 1e-15)} for row in rows
         ]
-    figure = Figure(figsize=(1 + 4 * len(panels), 3.6), layout="constrained")
+    figure = Figure(figsize=(1 + 3.6 * len(panels), 3.8), layout="constrained")
     for axes, (problem, rows) in zip(figure.subplots(1, len(panels), sharey=True), panels.items()):
         for number, tool in enumerate((accuracy.CONTIN, accuracy.AUTO, accuracy.SCIPY)):
             _front(axes, [(1e3 * row["seconds"], row["error"]) for row in rows if row["tool"] == tool], number, tool)
@@ -158,7 +158,7 @@ def _accuracy(results, of_fold):
         axes.set(xlabel="time, ms", title=problem)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("relative error of the parameter")
-    figure.axes[0].legend(fontsize=8, loc="lower left")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
     return figure
 
 
