@@ -17,7 +17,7 @@ from contin.core.step import Reason, State, Stop, corrected
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.corner import changed_between
-from contin.levels import CORRECTED, DOUBLED, MOST_STEPS, ROUGH
+from contin.levels import CORRECTED, DOUBLED, MOST_STEPS, ROUGH, ROUND_OFF
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -187,12 +187,30 @@ def _nears(trial: Trial, state: State, limits: Sequence[float], primary: str) ->
     return abs(gone) > CORRECTED * abs(value) and (limits[int(gone > 0)] * value > 0 or abs(value) > ROUGH * size)
 
 
+def limit_neared(state: State, settings: Settings, start: Discretization) -> str:
+    """Return the limit of a free parameter that a run has reached up to round-off, while no size has grown; "" if none is.
+
+    So it is where a branch tends to a limit and never comes there. Where states grow, it goes to infinity.
+    """
+    system, now, then = state.system, state.system.solution.scales, start.solution.scales
+    if now is not then and (now.states / then.states).max(initial=0.0) > 1 / DOUBLED:
+        return ""
+    for name, size, rate in zip(system.free, system.free_scales, state.tangent[system.state_size :]):
+        value = system.parameter(state.x, name)
+        for limit in settings.limits.get(name, ()):
+            if 0 < abs(limit - value) < ROUND_OFF * (abs(limit) or size) and (limit - value) * rate > 0:
+                return f"{name} = {exact_text(limit)}"
+    return ""
+
+
 def ended(
     trial: Trial, state: State, settings: Settings, primary: str, notes: Notes, start: tuple[Discretization, Array]
 ) -> Stop | None:
-    """Return why a run ends after a step: it has as many points as it may have, goes to infinity, or stands still."""
+    """Return why a run ends after a step: it has as many points as it may have, a limit, goes to infinity, or stands still."""
     if state.accepted >= settings.max_points:
         return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
+    if near := limit_neared(state, settings, start[0]):
+        return Stop(Reason.LIMIT, f"reached {near} up to round-off")
     limits = settings.limits.get(primary)
     far = runs_away(trial.system, trial.x, *start)
     if far and not (limits and _nears(trial, state, limits, primary)):

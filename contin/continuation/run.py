@@ -20,7 +20,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.boundary.grazing import Touch
-from contin.continuation.failure import ended, met, no_convergence, runs_away, shorter_steps
+from contin.continuation.failure import ended, limit_neared, met, no_convergence, runs_away, shorter_steps
 from contin.continuation.first import begins_outside, corrected_first, frozen, on_branch
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
@@ -181,6 +181,8 @@ class Continuation:
             due, state = self._adapt(), self.state
             lane = None if state.singular else self._lanes.of(state.system, self._steps.settings, self._notes.is_noisy)
             if lane is None or runs_away(state.system, state.x, *self.start[:2]):
+                return
+            if limit_neared(state, self.settings, self.start[0]):
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self.here())

@@ -1,8 +1,10 @@
 """Branches that go to infinity end where numbers are round-off of those at their start."""
 
+import math
+
 import pytest
 
-from contin import AlgebraicProblem, MapProblem, diagram, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, MapProblem, diagram, solve, trace
 
 BRANCHES = {"pole": lambda u, p: (u.x * p.a - 1,), "line": lambda u, p: (u.x - p.a,), "parabola": lambda u, p: (u.x**2 - p.a,)}
 
@@ -34,3 +36,18 @@ def test_a_fixed_point_of_a_map_that_goes_to_infinity():
     logistic = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 2.0})
     branch = trace(solve(logistic, [0.5]), free=["r"], limits={"r": (-5, 5)}, direction=-1)
     assert branch.stop.reason == "infinity" and len(branch) < 100 and abs(branch[-1]["r"] * (1 - branch[-1]["x"]) - 1) < 1e-4
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])
+def test_a_limit_to_which_a_branch_tends_ends_it(unit):
+    """Bratu's problem tends to lambda = 0 while u grows as a logarithm: it went on to 5e-303, in ten times as many points."""
+    bratu = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam / unit * math.exp(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 0.0}
+    )
+    branch = trace(solve(bratu, [0.0, 0.0]), free=["lam"], limits={"lam": (0, 4 * unit)})
+    assert str(branch.stop) == "reached lam = 0 up to round-off" and len(branch) < 50
+    assert branch.labelled("LP")[0]["lam"] == pytest.approx(3.513830719125161 * unit) and 0 < branch[-1]["lam"] < 1e-13 * unit
+    rest = AlgebraicProblem(lambda u, p: (math.exp(-u.x) - p.a + 1,), ["x"], {"a": 2.0})
+    for low, last in ((1.0, 1.0), (1.0 + 1e-9, 1.0 + 1e-9)):  # the second one is reached
+        branch = trace(solve(rest, [0.0]), free=["a"], direction=-1, limits={"a": (low, 3)})
+        assert branch.stop.reason == "limit" and len(branch) < 30 and branch[-1]["a"] == pytest.approx(last, abs=1e-13)
