@@ -140,6 +140,21 @@ def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Arr
     return total * np.prod(sizes) / (2 ** (count - 1) * np.prod(np.arange(1, count + 1)))
 
 
+def of_function(function: Callable[[Array], Array], x: Array, directions: Sequence[Array]) -> Array:
+    """Return the derivative of a function of vectors at x along several directions.
+
+    Examples
+    --------
+    >>> print(of_function(lambda x: x[:1] * x[:1] * x[1:], np.ones(2), np.eye(2)).round(6).item())
+    2.0
+    """
+
+    def bend(v: Array) -> Array:
+        return derivative(lambda s: function(x + s * v), len(directions), 1 / np.abs(v).max())[0]
+
+    return of_lines(bend, directions)
+
+
 def subsets(count: int) -> list[Numbers]:
     """Return all subsets of the first numbers, small ones first.
 

@@ -14,7 +14,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.collocation.corners import NOWHERE, Switching
 from contin.collocation.mesh import MeshControl
-from contin.core.differences import derivative, of_lines
+from contin.core.differences import of_function
 from contin.linalg.blocks import Factors
 from contin.problems.statement import Statement
 
@@ -130,11 +130,7 @@ class Discretization(Equations, Protocol):
 
         Kinds of system that state no derivatives of F of higher order have differences of the residual, along lines.
         """
-
-        def bend(v: Array) -> Array:
-            return derivative(lambda s: self.residual(x + s * v), len(directions), 1 / np.abs(v).max())[0]
-
-        return of_lines(bend, directions)
+        return of_function(self.residual, x, directions)
 
     def magnitudes(self, x: Array) -> Array:
         """Return the sizes of the unknowns relative to which x must be known, shape (size,).

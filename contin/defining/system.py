@@ -25,6 +25,7 @@ import numpy as np
 
 from contin.arrays import Array, Function
 from contin.collocation.mesh import MeshControl
+from contin.core.differences import of_function
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.system import System
@@ -193,6 +194,12 @@ class Defining(Discretization):
         beside = np.vstack([self.own_vectors(x), columns[:, :-count]])
         residual, factors = self.base.linearize(self.inside(x), np.vstack([top, rows]), beside)
         return self._residual(x, residual), factors
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F and g along several directions: that of g by differences."""
+        if self.own_unknowns:
+            return super().along(x, directions)
+        return np.append(self.base.along(x, directions), of_function(self.own_values, x, directions))
 
     def events(self) -> list[Event]:
         """Return that of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.

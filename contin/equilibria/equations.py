@@ -15,7 +15,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Numbers
 from contin.collocation.mesh import MeshControl
-from contin.core.differences import derivative, of_lines
+from contin.core.differences import derivative, of_function
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import Spectral, may_be_on_axis, off_axis
@@ -329,10 +329,7 @@ class Algebraic(Spectral, Composed):
         def product(at: Array) -> Array:
             return self._jacobian(at)[1] @ last
 
-        def bend(v: Array) -> Array:
-            return derivative(lambda s: product(x + s * v), len(others), 1 / np.abs(v).max())[0]
-
-        return of_lines(bend, others) if others else product(x)
+        return of_function(product, x, others) if others else product(x)
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""

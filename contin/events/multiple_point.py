@@ -299,10 +299,10 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     quadratic = manifold.third(second) / 2
     starts = generator("multiple point").standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
-    outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)
-    if max(len(outer), len(inside)) > 2 * 3**manifold.d or not all(_is_isolated(manifold, s, a) for a in inside):
+    inside = _zeros(linear, quadratic, _SPHERES[1], starts)
+    if len(inside) > 2 * 3**manifold.d or not all(_is_isolated(manifold, s, a) for a in inside):
         return [], True
-    result: list[Array] = []
+    outer, result = _zeros(linear, quadratic, _SPHERES[0], np.reshape(inside, (-1, count))), list[Array]()
     for a in inside:
         nearest = max(outer, key=lambda other: float(other @ a), default=None)
         if nearest is None or nearest @ a < np.cos(10 * _SPHERES[0]):

@@ -1,0 +1,36 @@
+"""Curves in two parameters compute each thing once: what their equations are made of, and their derivatives."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from bank.gelfand import perturbed_gelfand
+from contin import AlgebraicProblem, curve, solve, trace
+from contin.core.differences import of_function
+
+
+@functools.cache
+def cusp():
+    """Folds of x' = mu + lam x - x^3: lam = 3 x^2, mu = -2 x^3."""
+    problem = AlgebraicProblem(lambda u, p: (p.mu + p.lam * u.x - u.x**3,), ["x"], {"mu": -1.0, "lam": 1.0})
+    start = trace(solve(problem, [-1.3]), free=["mu"], limits={"mu": (-1, 1)}).labelled("LP")[0]
+    return curve(start, "lam", limits={"lam": (0.5, 2)})
+
+
+@functools.cache
+def extrema():
+    branch = trace(solve(perturbed_gelfand(), [0, 0]), free=["lam"], limits={"lam": (0, 6), "mean": (-1, 3)})
+    return curve(branch.labelled("LP")[0], "eps", limits={"eps": (0.15, 0.25)})
+
+
+@pytest.mark.parametrize("made", [cusp, extrema])
+def test_derivatives_along_directions(made):
+    """They agree with differences of the whole residual, whose errors are 1e-6 of second order and 1e-4 of third."""
+    point = made().points[2]
+    random = np.random.default_rng(3)
+    for count, error in ((2, 1e-5), (3, 1e-3)):
+        directions = random.standard_normal((count, point.x.size))
+        wanted = of_function(point.system.residual, point.x, directions)
+        found = point.system.along(point.x, directions)
+        assert found == pytest.approx(wanted, rel=error, abs=error * np.abs(wanted).max())
