@@ -194,7 +194,7 @@ def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
         return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
 
     def flip(trial: Trial) -> float:
-        exponents = trial.system.base.eigenvalues(trial.x)
+        exponents = trial.system.base.computed_eigenvalues(trial.x)  # round-off of a pair changes no sign
         others = exponents[np.argsort(np.abs(exponents))[critical:]]
         size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
         multipliers = np.exp(others - size)

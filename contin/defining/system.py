@@ -111,7 +111,7 @@ class Defining(Discretization):
         self.borders: Any = None
         #: The size of the largest reference of the run, where solutions have one.
         self.largest = float(cast(Any, base).reference_size) if base.size_of_solutions is not None else 0.0
-        self._known: dict[str, tuple[bytes, Any]] = {}
+        self._known: dict[str, dict[bytes, Any]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: all but what is computed when it is first asked for."""
@@ -160,11 +160,13 @@ class Defining(Discretization):
         return self.once(self.computed, x)
 
     def once(self, compute: Callable[[Array], T], x: Array) -> T:
-        """Return what a method computes at x; it is kept for the last x."""
-        key, name = x.tobytes(), compute.__name__
-        if self._known.get(name, (b"", None))[0] != key:
-            self._known[name] = key, compute(x)
-        return self._known[name][1]
+        """Return what a method computes at x; it is kept for the last two, both ends of a step."""
+        key, kept = x.tobytes(), self._known.setdefault(compute.__name__, {})
+        if key not in kept:
+            if len(kept) > 1:
+                del kept[next(iter(kept))]
+            kept[key] = compute(x)
+        return kept[key]
 
     def inside(self, x: Array) -> Array:
         """Return the unknowns of the underlying system."""

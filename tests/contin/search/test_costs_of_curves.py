@@ -34,3 +34,16 @@ def test_derivatives_along_directions(made):
         wanted = of_function(point.system.residual, point.x, directions)
         found = point.system.along(point.x, directions)
         assert found == pytest.approx(wanted, rel=error, abs=error * np.abs(wanted).max())
+
+
+def test_both_ends_of_a_step_are_kept():
+    point, other = cusp().points[1:3]
+    system, calls = point.system, []
+
+    def computed(x):
+        calls.append(x)
+        return len(calls)
+
+    for x in (point.x, other.x, point.x, other.x):
+        system.once(computed, x)
+    assert len(calls) == 2
