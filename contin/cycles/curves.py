@@ -27,7 +27,7 @@ from contin.defining.critical import CriticalCurve, degenerate, signed_smallest
 from contin.defining.special_points import FoldCurve
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.interpolated import meeting
-from contin.events.normal_forms import UNKNOWN, Coefficient, coefficient, flip, pair
+from contin.events.normal_forms import UNKNOWN, Coefficient, flip, pair
 from contin.levels import APART, CORRECTED, ROUGH, ROUND_OFF
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class DoublingCurve(MultiplierCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return c."""
-        return UNKNOWN if self.is_long else coefficient(self.base, x, flip)
+        return UNKNOWN if self.is_long else self.of(flip, x)
 
     def events(self) -> list[Event]:
         """Return those of a second multiplier -1, of generalized period doublings, and of folds."""
@@ -109,7 +109,7 @@ class TorusCurve(MultiplierCurve):
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
         if self.is_long or self.imaginary_part(x) < APART or abs(self.kappa(x) - RESONANCES["R3"]) < APART:
             return UNKNOWN
-        return coefficient(self.base, self.inside(x), pair, self.frequency(x))
+        return self.of(pair, x, self.frequency(x))
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, Re d, and the angle."""

@@ -34,7 +34,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Numbers
 from contin.core.labels import Label
 from contin.core.spectral import Spectral
 from contin.core.trial import Event, Trial
@@ -86,20 +86,18 @@ class CriticalCurve(Defining):
 
     # --- null vectors ----------------------------------------------------------------------------------------------------
 
-    def form(self, x: Array) -> Form:
-        """Return the characteristic matrix without the multiplier that is one along every autonomous cycle."""
-        return self.base.form(self.inside(x)).reduced
-
     def computed(self, x: Array) -> tuple[Form, Bordered]:
-        """Return the characteristic matrix, and it bordered."""
-        form, copies, coupling = self.form(x), self.own_equations, self.coupling(self.kappa(x))
+        """Return the characteristic matrix, and it bordered without the multiplier that is one along every autonomous cycle."""
+        whole, copies, coupling = self.base.form(self.inside(x)), self.own_equations, self.coupling(self.kappa(x))
+        form = whole.reduced
         shape = form.equations, len(form.places)
 
         def bordered(b: Array, c: Array) -> Bordered:
             return Bordered(form.solver(coupling, (b, c)), (copies * shape[0], copies * shape[1]), copies, copies)
 
         found, self.borders = null_vectors(bordered, shape, self.borders, form.weights, lambda found: self._single(x, found))
-        return form, found
+        whole.borders = self.borders[0][: whole.equations], self.borders[1][: len(whole.places)]
+        return whole, found
 
     def null_vectors(self, x: Array) -> tuple[Array, Array]:
         """Return v (copies, m), and w_i of each g_i, (copies, copies, n)."""
@@ -124,8 +122,8 @@ class CriticalCurve(Defining):
 
     def own_gradients(self, x: Array) -> Array:
         """Return dg/dx."""
-        (form, _), (right, left), base = self.at(x), self.null_vectors(x), self.base
-        result = np.zeros((self.own_equations, self.size))
+        (right, left), base = self.null_vectors(x), self.base
+        form, result = self.at(x)[0].reduced, np.zeros((self.own_equations, self.size))
         for copy, v in enumerate(right):
             wide = np.zeros(base.size)
             wide[form.places] = v
@@ -143,6 +141,10 @@ class CriticalCurve(Defining):
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the coefficient of the normal form."""
         return np.append(super().functionals(x), self.coefficient_at(x).value)
+
+    def of(self, terms: Callable[..., Numbers], x: Array, *frequency: float) -> Coefficient:
+        """Return the coefficient that ``terms`` belong to, from the characteristic matrix that is at hand."""
+        return coefficient(self.base, self.inside(x), terms, *frequency, here=self.at(x)[0])
 
     def coefficient_at(self, x: Array) -> Coefficient:
         """Return `normal_form`, computed once."""
@@ -210,7 +212,7 @@ class HopfCurve(CriticalCurve):
     def normal_form(self, x: Array) -> Coefficient:
         """Return the first Lyapunov coefficient; NaN at Bogdanov-Takens points and neutral saddles."""
         frequency = self.frequency(x)
-        return coefficient(self.base, self.inside(x), pair, frequency) if frequency else UNKNOWN
+        return self.of(pair, x, frequency) if frequency else UNKNOWN
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, the frequency, and the first Lyapunov coefficient."""

@@ -127,12 +127,14 @@ class Form(ABC):
     - ``equations`` (int): Number of equations of one copy, which come first in F.
     - ``weights`` (ndarray): Of the unknowns of one copy.
     - ``doubled_side`` (int): Sign of the coefficient of a subcritical period doubling.
+    - ``borders`` (pair of ndarray, optional): About the critical null vectors, where these are known.
     """
 
     places: Indices
     equations: int
     weights: Array
     doubled_side = 1
+    borders: Borders | None = None
 
     @property
     def reduced(self) -> Form:
@@ -191,7 +193,7 @@ class Form(ABC):
         def bordered(b: Array, c: Array) -> Bordered:
             return Bordered(self.solver(coupling, (b, c)), (self.equations, size))
 
-        found, _ = null_vectors(bordered, (self.equations, size))
+        found, _ = null_vectors(bordered, (self.equations, size), self.borders)
         return self.normalized(found.left[0], found.right[0])
 
 
@@ -278,14 +280,19 @@ def _terms(form: Form, rate: complex, w: Numbers, terms: tuple[Any, ...], factor
     return np.array([form.unit(rate) * form.product(w, term) for term in terms]) / factor
 
 
-def coefficient(system: System, x: Array, terms: Callable[..., Numbers], *frequency: float) -> Coefficient:
-    """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite."""
+def coefficient(
+    system: System, x: Array, terms: Callable[..., Numbers], *frequency: float, here: Form | None = None
+) -> Coefficient:
+    """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite.
+
+    ``here`` is the form at x, if that is at hand.
+    """
 
     def there(point: Array) -> Numbers:
         with np.errstate(all="ignore"):
             return terms(here if point is x else system.form(point), *frequency)
 
-    here = system.form(x)
+    here = here or system.form(x)
     found = Coefficient.of(there, x, system)
     if terms is fold:
         return dataclasses.replace(found, value=abs(found.value))
