@@ -116,10 +116,14 @@ class Term(NamedTuple):
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of R f along several directions."""
+        if not self.batch.bends(self.columns):
+            return np.zeros(self.system.equations)
         return self.rows(self.batch.along(*self.inputs(x), [self._direction(v) for v in directions]))
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient by x of the derivative of w.R f along v."""
+        if not self.batch.bends(self.columns):
+            return np.zeros(self.system.size)
         return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), self.columns))
 
     def transposed(self, x: Array, w: Array) -> Array:

@@ -117,6 +117,10 @@ class Recorded:
         places = {self.recording.time: time, **dict(zip(self.recording.inputs, labels))}
         return self.recording.tape.lines(self.recording.results, places)
 
+    def bends(self, inputs: tuple[int, ...]) -> bool:
+        """Return whether derivatives by these inputs may change."""
+        return bool(self._once(("bends", inputs), lambda: self._weighted_slopes(inputs)))
+
     def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian that may differ from zero."""
         rows, columns = np.array(list(self._slopes(inputs)), dtype=np.int64).reshape(-1, 2).T
@@ -634,6 +638,10 @@ class Batch:
             kept[key] = Columns(np.array(inputs, dtype=np.int64), *self._own.entries(inputs))
         return kept[key]
 
+    def bends(self, columns: Columns) -> bool:
+        """Return whether derivatives by these columns may change: functions are not linear, or not recorded."""
+        return self.recorded is None or self.recorded.bends(columns.request.inputs)
+
     @functools.cached_property
     def depends(self) -> Pattern:
         """Sparsity pattern: which values depend on which of u, v (with ``ends``), p; shape (count, inputs)."""
@@ -692,6 +700,9 @@ class Piecewise:
     def __init__(self, batches: Sequence[Any], starts: Sequence[int]) -> None:
         self.batches, self.count, self.columns = batches, batches[0].count, batches[0].columns
         self._pieces = [slice(*ends) for ends in zip(starts, [*starts[1:], None])]
+
+    def bends(self, columns: Columns) -> bool:
+        return any(batch.bends(columns) for batch in self.batches)
 
     def values(self, *given: Any) -> Array:
         """Return values at all points; the others, as of a `Batch`, likewise."""

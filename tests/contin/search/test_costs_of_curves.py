@@ -47,3 +47,13 @@ def test_both_ends_of_a_step_are_kept():
     for x in (point.x, other.x, point.x, other.x):
         system.once(computed, x)
     assert len(calls) == 2
+
+
+def test_linear_functions_do_not_bend():
+    """Boundary conditions u(0) = u(1) = 0 have no second derivatives; the field has."""
+    system = extrema().points[0].system.base
+    inside, ends = system._terms
+    assert inside.batch.bends(inside.columns)
+    assert not ends.batch.bends(ends.columns)
+    v, w = np.ones(system.size), np.ones(system.equations)
+    assert not ends.bent(np.ones(system.size), w, v).any()
