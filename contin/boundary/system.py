@@ -473,9 +473,9 @@ class Collocation(Composed):
         blocks = self._empty_blocks(len(rows), len(columns))
         given = self._layout, self.tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
         run(assemble, given, self._segments(blocks.local.size), (True, False))
-        k, q, left = len(self.free), self.problem.integral_size, self._left
+        k, q = len(self.free), self.problem.integral_size
         for each in self.crossings(x):
-            local, border = blocks.local[each.node], blocks.border[each.node, :q]
+            left, local, border = self._left, blocks.local[each.node], blocks.border[each.node, :q]
             local[:, self._n * (self._d + 1) :][:, :k] += local[:, left] @ each.by_free
             blocks.corner[:q, :k] += border[:, left] @ each.by_free
             for block in (local, border):
@@ -588,14 +588,14 @@ class Collocation(Composed):
     def _to_nodes(self, slopes: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
         by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        return self._gathered(self.basis.value.T @ by_points, slopes[:, self._n :].sum(axis=0))
+        return self._gathered(self.basis.value.T @ by_points, np.add.reduce(slopes[:, self._n :]))
 
     def _gathered(self, blocks: Array, free: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by the states of each interval, (N, d + 1, n), and others."""
         for each in self._last_crossings:
             free = free + blocks[each.node, 0] @ each.by_free
             blocks[each.node, 0] = blocks[each.node, 0] @ each.by_states
-        return np.append(_by_node(blocks).ravel(), free)
+        return np.concatenate([_by_node(blocks).ravel(), free])
 
     # --- functionals ---------------------------------------------------------------------------------------------
 

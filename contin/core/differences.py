@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -101,6 +100,10 @@ def _differences(function: Callable[[float], Any], middle: Array, order: int, h:
 Numbers = tuple[int, ...]
 
 
+#: Those of the imaginary unit.
+_POWERS = np.array([1, 1j, -1, -1j])
+
+
 def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any]) -> Any:
     """Return a real multilinear form of complex vectors, from its values at their real and imaginary parts.
 
@@ -111,12 +114,11 @@ def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any])
     >>> print(of_complex(lambda v: v[0] * v[1], [np.array([1 + 2j]), np.array([3 - 1j])]).item())
     (5+5j)
     """
-    parts = [[(1.0, vector)] if np.isrealobj(vector) else [(1.0, vector.real), (1j, vector.imag)] for vector in vectors]
-    every = list(itertools.product(*parts))
-    factors = np.array([math.prod(factor for factor, _ in chosen) for chosen in every])
-    stacks = [np.array(stack) for stack in zip(*([vector for _, vector in chosen] for chosen in every))]
-    values = form(stacks)
-    return (factors @ values.reshape(len(every), -1)).reshape(values.shape[1:])
+    parts = [np.array([vector.real, vector.imag] if vector.dtype.kind == "c" else [vector]) for vector in vectors]
+    chosen = np.indices([len(part) for part in parts]).reshape(len(parts), -1)  # 1 where the imaginary part is
+    values = form([part[each] for part, each in zip(parts, chosen)])
+    factors = (_POWERS if chosen.any() else _POWERS.real)[chosen.sum(axis=0) % 4]
+    return (factors @ values.reshape(len(factors), -1)).reshape(values.shape[1:])
 
 
 def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Array:

@@ -49,7 +49,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -58,6 +58,7 @@ from contin.core.differences import of_complex
 from contin.draws import generator
 from contin.events.normal_forms import DenseForm, Direction, Form
 from contin.linalg.border import Borders
+from contin.linalg.matrices import DenseFactors
 from contin.problems.statement import PERIOD
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ class Collocated:
 
 def _by_parts(solve: Callable[[Array], Array], values: Array) -> Array:
     """Return the solutions of real equations with right-hand sides that may be complex."""
-    if np.isrealobj(values):
+    if values.dtype.kind != "c":
         return solve(values)
     real, imaginary = solve(np.stack([values.real, values.imag]))
     return real + 1j * imaginary
@@ -132,7 +133,7 @@ class Solver:
             for copy in range(copies):
                 matrix[copy, : around.size - inside, copy, -1] += border[0][inside:]
                 matrix[copy, -1, copy, n : n + around.phased] += border[1][around.states :]
-        self._matrix = matrix.reshape(copies * matrix.shape[1], -1)
+        self._factors = DenseFactors(matrix.reshape(copies * matrix.shape[1], -1))
 
     def _traces(self, v: Array) -> Array:
         """Return what the conditions need of v (..., states): [v(0), v(1), c.v]."""
@@ -155,10 +156,12 @@ class Solver:
             return np.array([self.solve(row) for row in b])
         copies, size, inside, n = len(self._coupling), self._round.size, self._collocated.inside, self._round.n
         own, borders = b[: copies * size].reshape(copies, size), b[copies * size :].reshape(copies, -1)
-        v = self._collocated.solve(own[:, :inside])
-        y = self._solved(self._matrix, np.hstack([own[:, inside:], borders]) - self._conditions(self._traces(v)))
-        v = v + y @ self._basis
-        return np.append(np.hstack([v, y[:, n : n + self._round.phased]]), y[:, n + self._round.phased :])
+        v, last, right = np.zeros(1), n + self._round.phased, np.concatenate([own[:, inside:], borders], axis=1)
+        if own.any():
+            v = self._collocated.solve(own[:, :inside])
+            right = right - self._conditions(self._traces(v))
+        y = self._factors.solve(right.ravel()).reshape(right.shape)
+        return _joined(v + y @ self._basis, y[:, n:last], y[:, last:])
 
     def solve_transposed(self, c: Array) -> Array:
         """Return the y with A^T y = c, likewise."""
@@ -167,7 +170,8 @@ class Solver:
         copies, around, n = len(self._coupling), self._round, self._round.n
         own, borders = c[: copies * around.size].reshape(copies, around.size), c[copies * around.size :].reshape(copies, -1)
         v, of_period = own[:, : around.states], own[:, around.states :]
-        y = self._solved(self._matrix.T, np.hstack([np.zeros((copies, n)), of_period, borders]) + v @ self._basis.T)
+        right = np.concatenate([np.zeros((copies, n)), of_period, borders], axis=1) + v @ self._basis.T
+        y = self._factors.solve_transposed(right.ravel()).reshape(right.shape)
         rest = v.astype(y.dtype)
         rest[:, -n:] -= y[:, :n]
         rest[:, :n] += self._coupling.T @ y[:, :n] @ around.system.turn
@@ -175,16 +179,13 @@ class Solver:
             rest[:, :n] -= y[:, n, None] * around.direction
         if self._row is not None:
             rest = rest - y[:, -1:] * self._row
-        w = self._collocated.solve_transposed(rest)
         ends = n + around.phased
-        return np.append(np.hstack([w, y[:, :ends]]), y[:, ends:])
+        return _joined(self._collocated.solve_transposed(rest), y[:, :ends], y[:, ends:])
 
-    def _solved(self, matrix: Array, right: Array) -> Array:
-        """Return the solution of the dense equations, shape (copies, :)."""
-        try:
-            return cast(Any, np.linalg.solve(matrix, right.ravel())).reshape(right.shape)
-        except np.linalg.LinAlgError:
-            return np.full(right.shape, np.nan)
+
+def _joined(one: Array, other: Array, last: Array) -> Array:
+    """Return the rows of two arrays, each joined, and then those of a third."""
+    return np.concatenate([np.concatenate([one, other], axis=1).ravel(), last.ravel()])
 
 
 class Round:

@@ -77,7 +77,7 @@ class FoldCurve(Defining):
 
     kind = Label.FOLD
 
-    @property
+    @functools.cached_property
     def _held(self) -> list[int]:
         """Places of both parameters, the second one last, and of those that fix the solution besides."""
         return [self.base.state_size, *range(self.base.equations + 1, self.base.size)]
@@ -85,13 +85,14 @@ class FoldCurve(Defining):
     def computed(self, x: Array) -> tuple[Bordered, Array]:
         """Return the bordered matrix, with the parameters held where they are, and the residual of F."""
         base, places = self.base, self._held
-        held = np.zeros((len(places), base.size + 1))
-        held[np.arange(len(places)), places] = 1.0
+        rows = np.zeros((len(places) + 1, base.size + 1))
+        rows[np.arange(len(places)), places] = 1.0
         shape, residual = (base.equations, base.size), np.empty(0)
 
         def bordered(b: Array, c: Array) -> Bordered:
             nonlocal residual
-            residual, factors = base.linearize(x, np.vstack([held, np.append(c, 0.0)]), b[None, :])
+            rows[-1, :-1] = c
+            residual, factors = base.linearize(x, rows, b[None])
             return Bordered(factors, shape, held=len(places))
 
         found, self.borders = null_vectors(bordered, shape, self.borders, base.weights)

@@ -178,18 +178,17 @@ class Defining(Discretization):
         return self._residual(x, self.base.residual(self.inside(x)) if known is None else known.residual)
 
     def _residual(self, x: Array, inside: Array) -> Array:
-        further = x[self.base.size :] @ self.own_vectors(x) if self.own_unknowns else 0.0
-        return np.append(inside + further, self.own_values(x))
+        further = inside + x[self.base.size :] @ self.own_vectors(x) if self.own_unknowns else inside
+        return np.concatenate([further, self.own_values(x)])
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return the residual, and the factored bordered matrix: the gradients of g come first among its rows."""
         wide, count, known = self.size + len(columns), self.own_equations, self.known(x)
-        rows = np.array(rows, dtype=float).reshape(-1, wide)
-        gradients = self.once(self.own_gradients, x)
+        rows, gradients = np.array(rows, dtype=float).reshape(-1, wide), self.once(self.own_gradients, x)
         if known is not None and not len(columns):
-            replaced = ReplacedRows(known.factors, known.solutions, np.vstack([gradients, rows]))
+            replaced = ReplacedRows(known.factors, known.solutions, np.concatenate([gradients, rows]))
             return self._residual(x, known.residual), replaced
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         top = np.hstack([gradients, columns[:, -count:].T])

@@ -99,7 +99,7 @@ class InterpolatedZero(Finding):
         window = Window(state, self.at, old.width, _NODES[old.count == _NODES[0]])
         through = _polynomial(old, self.points, old.count)
         points = [located(state, carry(through(place)), float(place), newton) for place in window.places]
-        return _interpolated(window, points, self.functions, window.count)
+        return _interpolated(window, points, self.functions, [window.count])[0]
 
 
 def interpolated_zero(arc: Arc, functions: Functions, near: float) -> InterpolatedZero | None:
@@ -109,7 +109,7 @@ def interpolated_zero(arc: Arc, functions: Functions, near: float) -> Interpolat
         try:
             window = Window(arc.state, near, share * arc.step, _NODES[0])
             points = _around(arc, window)
-            found, other = (_interpolated(window, points, functions, count) for count in _NODES)
+            found, other = _interpolated(window, points, functions, _NODES)
         except ConvergenceError:
             continue
         change = float(np.abs(found.trial.x - other.trial.x).max())
@@ -158,12 +158,19 @@ def _around(arc: Arc, window: Window) -> list[Trial]:
     return points
 
 
-def _interpolated(window: Window, points: Sequence[Trial], functions: Functions, count: int) -> InterpolatedZero:
-    """Return the zero from the points at the nodes, by polynomials of so many coefficients.
+def _interpolated(
+    window: Window, points: Sequence[Trial], functions: Functions, counts: Sequence[int]
+) -> list[InterpolatedZero]:
+    """Return the zeros from the points at the nodes, by polynomials of so many coefficients.
 
     Raises ConvergenceError where the functions have no common zero in the middle half of the window.
     """
     values = np.array([[function(point) for function in functions] for point in points])
+    return [_zero(window, points, functions, values, count) for count in counts]
+
+
+def _zero(window: Window, points: Sequence[Trial], functions: Functions, values: Array, count: int) -> InterpolatedZero:
+    """Return the zero by polynomials of so many coefficients, from the values of the functions (nodes, functions)."""
     test = _polynomial(window, values, count)
     left, right = (
         (place, float(test(place)[0])) for place in (window.middle - window.width / 2, window.middle + window.width / 2)

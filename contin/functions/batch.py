@@ -501,6 +501,11 @@ class Columns:
         """The same, the entries of the Jacobian alone."""
         return self.request._replace(packed=True)
 
+    @functools.cached_property
+    def bent(self) -> Request:
+        """Gradients by these inputs of the derivatives along a direction, with weights."""
+        return self.request._replace(order=1, weighted=True)
+
 
 class Batch:
     """Functions of a point, prepared together: values and exact Jacobian at many points in one call.
@@ -640,7 +645,7 @@ class Batch:
 
     def bends(self, columns: Columns) -> bool:
         """Return whether derivatives by these columns may change: functions are not linear, or not recorded."""
-        return self.recorded is None or self.recorded.bends(columns.request.inputs)
+        return isinstance(self._own, Interpreted) or self._own.bends(columns.request.inputs)
 
     @functools.cached_property
     def depends(self) -> Pattern:
@@ -676,8 +681,7 @@ class Batch:
         -------
         ndarray, shape (points, columns.width)
         """
-        request = Request(columns.request.inputs, 1, weighted=True)
-        return self._own.evaluate(request, t, u, v, p, [direction, weights])[1][:, 0]
+        return self._own.evaluate(columns.bent, t, u, v, p, [direction, weights])[1][:, 0]
 
     def load(self, columns: Columns | None = None, order: int = 0) -> Loaded:
         """Return the program of the values or, with ``columns``, of values and derivatives, as kernels run it.

@@ -28,6 +28,7 @@ Where M is regular everywhere, it is the small matrix that becomes singular.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -149,7 +150,7 @@ def rows_fit(tangents: Array, weights: Array) -> bool:
 
 def cosine(a: Array, b: Numbers) -> float:
     """Return the absolute cosine between a real vector and a real or complex one; 0 where one has no length."""
-    return float(abs(a @ b) / (np.sqrt((a @ a) * float(np.vdot(b, b).real)) or 1.0))
+    return float(abs(a @ b) / (math.sqrt(float(a @ a) * float(np.vdot(b, b).real)) or 1.0))
 
 
 def orthonormal(vectors: Array, weights: Array | float = 1.0) -> Array:
@@ -265,7 +266,7 @@ class ReplacedRows:
     def __init__(self, factors: Factors, solutions: Array, rows: Array) -> None:
         self.size, self.others = rows.shape[1], solutions.shape[1] - len(solutions)
         self.factors, self.rows, self._added = factors, rows, solutions[:, : self.size]
-        self.small = np.vstack([rows @ self._added.T, solutions[:, self.size :].T])
+        self.small = np.concatenate([rows @ self._added.T, solutions[:, self.size :].T])
 
     @functools.cached_property
     def _small(self) -> DenseFactors:
@@ -278,11 +279,14 @@ class ReplacedRows:
 
     def solve(self, b: Array) -> Array:
         """Return the x with J x = b, or for rows of b the rows x."""
-        right = np.concatenate([b[..., self.others :], np.zeros((*b.shape[:-1], len(self.small) - len(self.rows)))], axis=-1)
-        if not b[..., : self.others].any():
+        count, others = len(self.rows), self.others
+        given, right = np.zeros((*b.shape[:-1], others + len(self.small))), np.zeros((*b.shape[:-1], len(self.small)))
+        right[..., :count], given[..., :others] = b[..., others:], b[..., :others]
+        if not given.any():
             return np.asarray(self._small.solve(right) @ self._added)
-        first = self.factors.solve(np.concatenate([b[..., : self.others], np.zeros_like(right)], axis=-1))
-        right -= np.concatenate([first[..., : self.size] @ self.rows.T, first[..., self.size :]], axis=-1)
+        first = self.factors.solve(given)
+        right[..., :count] -= first[..., : self.size] @ self.rows.T
+        right[..., count:] -= first[..., self.size :]
         return np.asarray(first[..., : self.size] + self._small.solve(right) @ self._added)
 
     def solve_transposed(self, c: Array) -> Array:
