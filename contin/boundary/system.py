@@ -32,7 +32,7 @@ from contin.collocation.assembly import Bordering, Tables, assemble, at_points, 
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
 from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near, with_breaks
-from contin.collocation.newton import Values, Workspace, workspace
+from contin.collocation.newton import Values, Workspace, linearize_on_mesh, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
 from contin.core.step import State, Stop
@@ -459,8 +459,14 @@ class Collocation(Composed):
         """Return the residual at x, and [[F_x, columns^T], [rows]] factored."""
         if self._components:
             return self._factored_apart(x, Bordering(columns, rows))
-        residual, blocks = self._assembled(x, rows, columns)
-        return residual, Factorization(self._layout, blocks, self._segments(blocks.local.size))
+        work = self.workspace
+        if work is None or work.values.projections.total:
+            residual, blocks = self._assembled(x, rows, columns)
+            return residual, Factorization(self._layout, blocks, self._segments(blocks.local.size))
+        factors = Factorization.unfilled(self._layout, self._empty_blocks(len(rows), len(columns)), work.mesh.whole)
+        residual, given = np.empty(self._conditions), (Bordering(columns, rows), np.array(x))
+        factors.sign = linearize_on_mesh(work, factors.room, *given, residual)
+        return residual, factors
 
     def _segments(self, numbers: int) -> Share:
         """Return the segments of a matrix with so many ``numbers`` in the blocks of all intervals."""
@@ -664,7 +670,7 @@ class Collocation(Composed):
 
     def _made_workspace(self) -> Workspace | None:
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
-        if own is None or not recorded or self._components or self.outcomes.size or not 0 <= self.size - self.equations <= 1:
+        if own is None or not recorded or self._components or self.outcomes.size or self.size < self.equations:
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))

@@ -178,11 +178,10 @@ def _fill_residual(mesh, room, x):
 
 
 @helper
-def _factor(mesh, room, matrix):
-    """Factor the matrix of the derivatives at hand; return the sign of its determinant."""
+def _factor(mesh, room, matrix, around):
+    """Factor the matrix of the derivatives at hand, bordered; return the sign of its determinant."""
     factors = matrix.factors
     blocks = Blocks(factors.local, factors.border, matrix.corners[0], matrix.first, matrix.last)
-    around = Bordering(room.columns, room.rows)
     assemble(mesh.layout, mesh.tables, mesh.h, room.jacobian, room.at_ends, around, blocks, mesh.whole)
     return factorize(mesh.layout, factors, matrix.corners, matrix.first, matrix.last, matrix.carried, mesh.whole)
 
@@ -226,7 +225,7 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
             return STAGNATES
         _fill_residual(mesh, room, x)
         if fresh:
-            report[SIGN] = _factor(mesh, room, matrix)
+            report[SIGN] = _factor(mesh, room, matrix, Bordering(room.columns, room.rows))
         _solve(mesh, room, matrix)
         before, size = size, subtract(x, room.update[0])
         report[ITERATIONS], report[UPDATES + number] = number + 1, size
@@ -254,7 +253,7 @@ def _linearize(work, matrix, x, weights, tangent, report, known):
     for i in range(x.size):
         room.at[i] = x[i]
     if not known:
-        report[SIGN] = _factor(mesh, room, matrix)
+        report[SIGN] = _factor(mesh, room, matrix, Bordering(room.columns, room.rows))
     right, last = room.right[0], room.right.shape[1] - 1
     for i in range(last):
         right[i] = 0.0
@@ -284,3 +283,13 @@ def correct_on_mesh(
     if done in (CONVERGED, RIGHT) and control.linearize:
         done = _linearize(work, matrix, x, weights, tangent, report, done == RIGHT)
     return CONVERGED if done == RIGHT else done
+
+
+@kernel(reorder=False)
+def linearize_on_mesh(work: Workspace, matrix: Factored, around: Bordering, x: Vector, residual: Vector) -> float:
+    """Fill the residual at x of the conditions of the problem, and factor their derivatives, bordered; return the sign."""
+    codes, mesh, room = work
+    evaluate(codes, mesh, room, x, True)
+    n, tables = room.points.shape[1], mesh.tables
+    collocate(n, tables.slope, tables.weights, mesh.h, x, room.field, room.boundary, residual)
+    return _factor(mesh, room, matrix, around)

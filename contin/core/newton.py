@@ -155,7 +155,7 @@ def _in_one_call(
     None where Python must decide whether updates are round-off. Raises ConvergenceError where they do not converge.
     """
     values = work.values
-    if (row is None) != (system.size == system.equations):
+    if system.size - system.equations != (row is not None):
         return None
     own = system.fill_conditions(values)
     if row is not None:

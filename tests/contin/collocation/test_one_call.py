@@ -102,6 +102,21 @@ def test_the_same_as_in_python(make, off, monkeypatch):
     assert found.factors.sign == system.linearize(found.x, (row,))[1].sign
 
 
+@pytest.mark.parametrize("make", [with_an_integral, scaled, cycles])
+def test_a_bordered_matrix_of_one_call(make, monkeypatch):
+    """Residual, solutions and the sign of the determinant are those of blocks that Python fills."""
+    system, x = system_of(make)
+    random = np.random.default_rng(4)
+    rows, column = random.standard_normal((2, system.size + 1)), random.standard_normal((1, system.equations))
+    residual, factors = system.linearize(x, rows, column)
+    monkeypatch.setattr(type(system), "workspace", None)
+    wanted, expected = system.linearize(x, rows, column)
+    right = random.standard_normal(system.size + 1)
+    assert residual == pytest.approx(wanted, abs=1e-13) and factors.sign == expected.sign
+    assert factors.solve(right) == pytest.approx(expected.solve(right), rel=1e-9)
+    assert factors.solve_transposed(right) == pytest.approx(expected.solve_transposed(right), rel=1e-9)
+
+
 def test_conditions_of_the_call_count():
     """A system with another reference of the phase shares the work space: each call takes its own row."""
     system, x = system_of(cycles)
