@@ -122,9 +122,10 @@ class Term(NamedTuple):
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient by x of the derivative of w.R f along v."""
-        if not self.batch.bends(self.columns):
+        columns = self.columns
+        if not self.batch.bends(columns):
             return np.zeros(self.system.size)
-        return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), self.columns))
+        return self.by_x(self.batch.bent(*self.inputs(x), self.weights(w), self._direction(v), columns))
 
     def transposed(self, x: Array, w: Array) -> Array:
         """Return the gradient by x of w.R f."""

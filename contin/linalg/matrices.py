@@ -114,7 +114,7 @@ class DenseFactors:
         b = np.asarray(b)
         if self._singular:
             return np.full(b.shape, np.nan)
-        if self._is_small and not np.iscomplexobj(b):
+        if self._is_small and b.dtype.kind != "c":
             rows = np.array(b, dtype=float, order="C", ndmin=2)
             solve_rows(self._lu, self._exchanges, rows, int(transposed))
             return rows.reshape(b.shape)
