@@ -496,7 +496,10 @@ class CycleCollocation(PeriodicCollocation):
         if outcome == DRIFTED and not self.outcomes.size:
             self._drifted.add(x.tobytes())
             count = room.starts[-1] + len(room.turn)
-            flow = self.rates(x, self._interpolated(x, ends_of_parts(self.mesh, room)))
+            ends = self._scaled_states(x)[:: self.degree].copy()  # of the intervals
+            if room.starts[-1] > self.intervals:
+                ends = self._interpolated(x, ends_of_parts(self.mesh, room))
+            flow = self.rates(x, ends)
             values = log_eigenvalues_along(room.matrices[:count], np.concatenate([flow[:count], flow[:1]]))
             room.real[:], room.imaginary[:] = values.real, values.imag
             fill_multipliers(room, 1)
