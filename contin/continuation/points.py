@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -126,7 +128,7 @@ IndexChange = tuple[int | None, int | None]
 
 
 def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
-    """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
+    """Return a special point located again on finer meshes, with its errors, if these are wanted."""
     if not found.label or not (found.is_located or found.stop is not None):
         return found  # a regular point, or one that gets no label
     labelled = found.label != Label.FAILED and not found.closes
@@ -136,11 +138,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
         details = found.details if found.same_as else again.details
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors, is_lost=again.is_lost)
         found = again.trial.system.judged(found) if found.at else found  # between mesh points, cycles are known better there
-    coarse = before.trial.system.coefficient(dataclasses.replace(before, label=found.label))
-    if coarse is not None:
-        better = coarse if found.trial is before.trial else found.trial.system.coefficient(found)
-        found = with_normal_form(found, better or coarse, coarse, settings.errors)
-    return found
+    return found if found.test is None or found.test.normal_form is None else dataclasses.replace(found, coarse=before)
 
 
 def is_confirmed(point: SpecialPoint, arc: Arc, notes: Notes) -> bool:
@@ -184,9 +182,28 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
     trial, system = found.trial, found.trial.system
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
     stability = Stability() if index is None else system.stability(found)
-    return Point(
+    point = Point(
         str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system.thawed, arclength,
         trial.iterations, trial.newton_error, found.errors or {}, found.details,
         stability.index, stability.nullity, change, stability.breaks,
         *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,
     )  # fmt: skip
+    if found.coarse is not None:
+        del vars(point)["name"], vars(point)["details"]
+        vars(point)["_told"] = functools.partial(_with_normal_form, _kept(found), _kept(found.coarse))
+    return point
+
+
+def _kept(found: SpecialPoint) -> SpecialPoint:
+    """Return a special point without what takes much memory."""
+    trial = Trial.without_tangent(found.trial.system, found.trial.x)
+    return dataclasses.replace(found, trial=trial, same_as=None, coarse=None)
+
+
+def _with_normal_form(found: SpecialPoint, coarse: SpecialPoint) -> tuple[str, Any]:
+    """Return name and details of a special point, with its normal form if it has one: that takes longer than to locate it."""
+    first = coarse.trial.system.coefficient(dataclasses.replace(coarse, label=found.label))
+    if first is not None:
+        better = first if found.trial.x is coarse.trial.x else found.trial.system.coefficient(found)
+        found = with_normal_form(found, better or first, first)
+    return found.full_name, found.details

@@ -177,6 +177,7 @@ class SpecialPoint:
       found.
     - ``is_lost`` (bool): It was looked for on a finer mesh, and is not there.
     - ``is_located`` (bool): It was found, and not only bracketed.
+    - ``coarse`` (SpecialPoint, optional): As the step has found it, where a normal form may belong to it.
     """
 
     at: float
@@ -190,6 +191,7 @@ class SpecialPoint:
     errors: Mapping[str, float] | None = None
     is_lost: bool = False
     is_located: bool = True
+    coarse: SpecialPoint | None = None
 
     __repr__ = shown
 

@@ -86,16 +86,16 @@ def fold(name: str) -> Event:
                  normal_form=normal_forms.fold)  # fmt: skip
 
 
-def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient, errors: bool) -> SpecialPoint:
+def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:
     """Return a special point with the coefficient in its details and, but for folds, what it means in its name.
 
     The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run. A coefficient that
-    is nothing but error is left out, and its error is stated. Where ``errors`` are not wanted, and none could change the sign,
-    it is not estimated.
+    is nothing but error is left out, and its error is stated. Where those of the point are not wanted, and none could change
+    the sign, it is not estimated.
     """
     if found is normal_forms.NOT_SMOOTH:
         return dataclasses.replace(point, name=f"{point.name}, not smooth")
-    unknown = not errors and found.is_certain
+    unknown = point.errors is None and found.is_certain
     error = 0.0 if unknown else found.error + abs(found.value - coarse.value)
     means = error < found.size or error < LOCATED  # it is less than the terms, or round-off of terms that are zero
     value = {"normal_form": found.value} if means else {}

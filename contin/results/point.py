@@ -135,6 +135,8 @@ class Point(Record):
     def normal_form(self) -> float | None:
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
+        It is computed when it, the point's name or its details are first asked for.
+
         There is none at a Hopf point whose field is not smooth, as with v |v|: its name says so.
 
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a

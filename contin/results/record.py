@@ -36,7 +36,7 @@ class Record:
     iterations: int
     newton_error: float
     errors: Mapping[str, float] = field(default_factory=dict)
-    details: Any = None
+    details: Any = field(default_factory=lambda: None)  # no value of the class, which would hide what is made later
     index: int | None = None
     nullity: int = 0
     index_change: tuple[int | None, int | None] | None = None
@@ -46,12 +46,19 @@ class Record:
     discretization_error: float = np.nan
 
     def __getattr__(self, name: str) -> Any:
-        """Return the functionals of a point of plain steps, which are computed when they are first asked for."""
-        if name != "functionals" or "system" not in vars(self):
+        """Return what is computed when first asked for: functionals of plain steps, a name or details with a normal form."""
+        known = vars(self)
+        if name == "functionals" and "system" in known:
+            known[name] = Trial.without_tangent(self.system, self.x).functionals
+        elif name in ("name", "details") and "_told" in known:
+            known["name"], known["details"] = known.pop("_told")()
+        else:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        found: Any = Trial.without_tangent(self.system, self.x).functionals
-        vars(self)["functionals"] = found
-        return found
+        return known[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled, the name and details among it."""
+        return {"name": self.name, **vars(self)}
 
     @property
     def is_simple_branch_point(self) -> bool:

@@ -70,7 +70,10 @@ def _located() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     ends = {"free": ["a"], "step": 0.1, "max_step": 0.1, "errors": False}
     return {
         "a fold": (lambda: contin.trace(start, **over), lambda: contin.trace(start, folds=False, **over)),
-        "a Hopf point, with its normal form": (lambda: contin.trace(moving, **through), lambda: contin.trace(still, **through)),
+        "a Hopf point, with its normal form": (
+            lambda: contin.trace(moving, **through).labelled("HB")[0].normal_form,
+            lambda: contin.trace(still, **through),
+        ),
         "an end at a limit": (
             lambda: contin.trace(start, limits={"a": (0, 1.55)}, max_points=50, **ends),
             lambda: contin.trace(start, max_points=8, **ends),
