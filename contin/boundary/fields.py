@@ -35,7 +35,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Function, Numbers
 from contin.boundary.system import Collocation
 from contin.core.labels import Label
-from contin.core.spectral import Spectral
+from contin.core.spectral import Eigenvalues, Spectral
 from contin.core.system import Inputs
 from contin.core.trial import Event
 from contin.defining.critical import HopfCurve
@@ -176,10 +176,9 @@ class Fields(Spectral, Collocation):
         """Return the number of unstable eigenvalues."""
         return int(np.count_nonzero(self.eigenvalues(x).real > 0))
 
-    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
-        """Return the eigenvalues at places, those furthest to the right first, twice."""
-        found = [self._rightmost(x) for x in places]
-        return [(values, values) for values in found]
+    def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
+        """Return the eigenvalues at places, those furthest to the right first."""
+        return [Eigenvalues(self._rightmost(x)) for x in places]
 
     def eigenvalue_near(self, x: Array, value: complex) -> complex:
         """Return the eigenvalue that is nearest to a value; NaN where none is found."""

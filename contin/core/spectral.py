@@ -6,17 +6,26 @@ far is seen by rounding what they are computed from once more, up or down by cha
 
 from __future__ import annotations
 
-import functools
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin import draws
 from contin.arrays import Array, ComplexArray, Mask
 from contin.levels import APART, CERTAIN, CORRECTED, LOCATED
+
+
+class Eigenvalues(NamedTuple):
+    """Eigenvalues with their round-off, and what returns those of pairs on the axis up to round-off with the real part 0.
+
+    ``settled`` is None where they are the same. It takes several spectra, and a zero of a real part is located without.
+    """
+
+    values: ComplexArray
+    settled: Callable[[], ComplexArray] | None = None
 
 
 class Spectral:
@@ -32,8 +41,8 @@ class Spectral:
     _once: Any
 
     @abstractmethod
-    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
-        """Return the eigenvalues at places: those of pairs on the axis up to round-off with the real part 0, and as computed.
+    def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
+        """Return the eigenvalues at places.
 
         This is the notion of stability of the kind of problem: whatever asks for eigenvalues asks this.
         """
@@ -43,26 +52,27 @@ class Spectral:
 
         All of them or, of large problems, those right of the imaginary axis or near to it.
         """
-        return self._eigenvalues(x)[0]
+        values, settled = self._spectrum(x)
+        return values if settled is None else self._once("settled", x, settled)
 
     def computed_eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues with their round-off, where a zero of a real part is located."""
-        return self._eigenvalues(x)[1]
+        return self._spectrum(x)[0]
 
     def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
         """Return the eigenvalues at several places, found together."""
-        new = [x for x in places if ("eigenvalues", x.tobytes()) not in self._known]
+        new = [x for x in places if ("spectrum", x.tobytes()) not in self._known]
         for x, found in zip(new, self.spectra(new) if new else ()):
-            self._once("eigenvalues", x, functools.partial(tuple, found))
+            self._once("spectrum", x, lambda: found)  # noqa: B023  called at once
         return [self.eigenvalues(x) for x in places]
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
         return "HB", "Hopf"
 
-    def _eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
-        return self._once("eigenvalues", x, lambda: self.spectra([x])[0])
+    def _spectrum(self, x: Array) -> Eigenvalues:
+        """Return the eigenvalues, found once: the ends of a step and of its parts are asked for several times."""
+        return self._once("spectrum", x, lambda: self.spectra([x])[0])
 
 
 def changes(again: Callable[[Callable[[Array], Array]], ComplexArray], values: ComplexArray, full: float = math.inf) -> Array:

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
-from contin.core.spectral import on_circle
+from contin.core.spectral import Eigenvalues, on_circle
 from contin.cycles.equations import OfCycles, is_pair
 from contin.cycles.normal_forms import MOST, MapForm
 from contin.equilibria.equations import Algebraic
@@ -224,16 +224,14 @@ class MapSystem(OfCycles, Algebraic):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
-    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
-        """Return the logarithms of the multipliers at places: those with a positive real part are unstable.
+    def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
+        """Return the logarithms of the multipliers at places: those with a positive real part are unstable."""
 
-        That of a pair on the unit circle, to round-off, has the real part zero; the second of each two is as computed.
-        """
+        def settled(x: Array, values: ComplexArray) -> ComplexArray:
+            return np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values)
+
         found = [(x, self._logarithms(x)) for x in places]
-        return [
-            (np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values), values)
-            for x, values in found
-        ]
+        return [Eigenvalues(values, functools.partial(settled, x, values)) for x, values in found]
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""

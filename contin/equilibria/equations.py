@@ -18,7 +18,7 @@ from contin.collocation.mesh import MeshControl
 from contin.core.differences import derivative, of_function
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
-from contin.core.spectral import Spectral, may_be_on_axis, off_axis
+from contin.core.spectral import Eigenvalues, Spectral, may_be_on_axis, off_axis
 from contin.core.system import Composed, Inputs, Scales, System, Term
 from contin.core.trial import Event, Trial
 from contin.defining.critical import HopfCurve, other_pairs
@@ -358,21 +358,19 @@ class Algebraic(Spectral, Composed):
             return self
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
-    def spectra(self, places: Sequence[Array]) -> list[tuple[ComplexArray, ComplexArray]]:
-        """Return the eigenvalues at places: those of pairs on the axis up to round-off with the real part 0, and as computed.
+    def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
+        """Return the eigenvalues at places.
 
         This is the notion of stability of the kind of problem: whatever asks for eigenvalues asks this.
         """
         if self.is_sparse:
-            return [
-                (found, found) for found in (rightmost(self.as_field().field_jacobian(x), self.problem.solver) for x in places)
-            ]
+            return [Eigenvalues(rightmost(self.as_field().field_jacobian(x), self.problem.solver)) for x in places]
         matrices = np.array([self.jacobian(x) for x in places])
         finite = np.isfinite(matrices).all()
         found = eigenvalues(matrices) if finite else np.array([eigenvalues(matrix) for matrix in matrices])
-        if finite and not may_be_on_axis(found).any():
-            return [(values, values) for values in found]
-        return [(off_axis(eigenvalues, matrix, values), values) for matrix, values in zip(matrices, found)]
+        near: Any = may_be_on_axis(found).any(axis=-1)
+        settled = [functools.partial(off_axis, eigenvalues, *both) for both in zip(matrices, found)]
+        return [Eigenvalues(values, again if doubtful else None) for values, again, doubtful in zip(found, settled, near)]
 
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""

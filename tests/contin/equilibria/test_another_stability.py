@@ -7,6 +7,7 @@ import pytest
 from scipy.special import lambertw
 
 import contin
+from contin.core.spectral import Eigenvalues
 from contin.equilibria.equations import Algebraic
 from contin.events.hopf import hopf
 
@@ -15,8 +16,7 @@ class Delayed(Algebraic):
     """Equilibria of u'(t) = -k u(t - 1), whose characteristic values are those of L = -k exp(-L)."""
 
     def spectra(self, places):
-        found = [lambertw(-self.parameter(x, "k"), np.arange(-3, 3)) for x in places]
-        return [(values, values) for values in found]
+        return [Eigenvalues(lambertw(-self.parameter(x, "k"), np.arange(-3, 3))) for x in places]
 
     def events(self):
         return [hopf()]
