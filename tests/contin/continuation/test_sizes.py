@@ -102,6 +102,26 @@ def test_usual_sizes_need_no_expansion():
     assert branch[0].system.scales.are_one and not expanded(bratu.batch("field"))
 
 
+def chua(u, p):
+    """Chua's circuit, whose current y is zero at all equilibria: no term of an expansion moves it."""
+    return p.alpha * (u.y - u.x**3 / 16 + u.x / 6), u.x - u.y + u.z, -14.0 * u.y
+
+
+def turning(u, p):
+    """The difference d of two pendula: sin(4 d) is as far from linear for 1 as for 1000."""
+    return p.alpha - u.x**2 + u.d**2, math.sin(4 * u.d) - u.z * u.d, u.x - 2 * u.z
+
+
+@pytest.mark.parametrize(("field", "names", "guess"), [
+    (chua, ["x", "y", "z"], [math.sqrt(8 / 3), 0.0, -math.sqrt(8 / 3)]), (turning, ["x", "d", "z"], [1.0, 0.0, 0.5]),
+])  # fmt: skip
+def test_states_that_stay_zero_need_no_expansion(field, names, guess):
+    problem = AlgebraicProblem(field, names, {"alpha": 1.0}, dynamics=False)
+    branch = trace(solve(problem, guess), free=["alpha"], limits={"alpha": (0.5, 3)})
+    assert branch[0].system.scales.are_one and not expanded(problem.batch("residual"))
+    assert branch[-1]["alpha"] == 3 and branch[-1][names[1]] == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("load", [1.0, 0.06, 125.0])
 @pytest.mark.parametrize("height", [1.1e-3, 6e3, 1e6])
 def test_one_unusual_amplitude_is_found(load, height):
