@@ -645,7 +645,8 @@ class Batch:
 
     def bends(self, columns: Columns) -> bool:
         """Return whether derivatives by these columns may change: functions are not linear, or not recorded."""
-        return isinstance(self._own, Interpreted) or self._own.bends(columns.request.inputs)
+        inputs = columns.request.inputs
+        return inputs is None or isinstance(self._own, Interpreted) or self._own.bends(inputs)
 
     @functools.cached_property
     def depends(self) -> Pattern:
