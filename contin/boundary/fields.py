@@ -96,14 +96,6 @@ class FieldForm(DenseForm):
             each[:, self.places] = stack
         return np.array([system.along(self._x, parts) for parts in zip(*wide)])
 
-    def coupling(self, rate: complex) -> Any:
-        """Return the rate itself."""
-        return rate if rate.imag else rate.real
-
-    def unit(self, rate: complex) -> complex:
-        """Return one over the frequency."""
-        return 1j / rate
-
     def length(self, right: Numbers) -> float:
         """Return the root of the mean of |v|^2 over the states with rates, in the user's units."""
         system, count = self._system, self._system.state_size

@@ -81,14 +81,6 @@ class EquilibriumForm(DenseForm):
         super().__init__(jacobian * sizes / sizes[:, None], len(jacobian), along, np.ones(len(jacobian)))
         self._sizes = sizes
 
-    def coupling(self, rate: complex) -> Any:
-        """Return the rate itself."""
-        return rate if rate.imag else rate.real
-
-    def unit(self, rate: complex) -> complex:
-        """Return one over the frequency."""
-        return 1j / rate
-
     def length(self, right: Numbers) -> float:
         """Return the length of v in the user's units."""
         return float(np.linalg.norm(right * self._sizes))

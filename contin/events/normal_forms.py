@@ -225,6 +225,14 @@ class DenseForm(Form):
                 matrix[i * size : (i + 1) * size, last], matrix[last, i * size : (i + 1) * size] = border
         return DenseFactors(matrix)
 
+    def coupling(self, rate: complex) -> Any:
+        """Return the rate itself."""
+        return rate if rate.imag else rate.real
+
+    def unit(self, rate: complex) -> complex:
+        """Return one over the frequency."""
+        return 1j / rate
+
     def coupled_parts(self, left: Numbers, right: Numbers) -> tuple[Numbers, Numbers]:
         """Return the last equations of w and the first unknowns of v."""
         return left[..., self.equations - self._count :], right[..., : self._count]
