@@ -229,7 +229,7 @@ class Round:
 
     def solver(self, coupling: complex | Numbers, border: tuple[Array, Array] | None = None) -> Solver:
         """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""
-        return Solver(self, np.atleast_2d(coupling), border)
+        return Solver(self, np.array(coupling, ndmin=2), border)
 
 
 #: Largest number of unknown states of a map: with twice as many, dense factors take eight times as long, a minute.

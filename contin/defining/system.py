@@ -191,9 +191,9 @@ class Defining(Discretization):
             replaced = ReplacedRows(known.factors, known.solutions, np.concatenate([gradients, rows]))
             return self._residual(x, known.residual), replaced
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        top = np.hstack([gradients, columns[:, -count:].T])
-        beside = np.vstack([self.own_vectors(x), columns[:, :-count]])
-        residual, factors = self.base.linearize(self.inside(x), np.vstack([top, rows]), beside)
+        top = np.concatenate([gradients, columns[:, -count:].T], axis=1)
+        beside = np.concatenate([self.own_vectors(x), columns[:, :-count]])
+        residual, factors = self.base.linearize(self.inside(x), np.concatenate([top, rows]), beside)
         return self._residual(x, residual), factors
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -212,10 +213,10 @@ class DenseForm(Form):
 
     def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> DenseFactors:
         """Return LU factors of L(P)."""
-        small, size, n = np.atleast_2d(coupling), self.equations, self._count
+        small, size, n = np.array(coupling, ndmin=2), self.equations, self._count
         copies, rows, columns = len(small), np.arange(size - n, size), np.arange(n)
         matrix: Any = np.zeros([copies * (size + (border is not None))] * 2, small.dtype)
-        for i, j in np.ndindex(small.shape):
+        for i, j in itertools.product(range(copies), repeat=2):
             block = matrix[i * size : (i + 1) * size, j * size : (j + 1) * size]
             if i == j:
                 block[:] = self._open
