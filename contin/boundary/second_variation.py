@@ -399,9 +399,9 @@ def _sizes(system: Collocation) -> Array:
 
 def _roots(hll: Array) -> tuple[Array, Array] | None:
     """Return C (N, d, n, k) with C C^T = H_ll, and what takes v to multipliers, (N, d, n, k); None unless H_ll >= 0."""
-    values, vectors = np.linalg.eigh(hll)
-    if not np.isfinite(values).all():
+    if not np.isfinite(hll).all():  # outside the range of the equations; LAPACK may raise an error for such a matrix
         return None
+    values, vectors = np.linalg.eigh(hll)
     largest = values.max(axis=2)
     if np.any(values < -DEPENDENT * largest[:, :, None]) or np.any(largest <= 0):
         return None
