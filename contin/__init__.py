@@ -19,6 +19,7 @@ from typing import Any
 import lazy_loader
 
 from contin.errors import warn
+from contin.text import meant
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
 __version__ = "0.3.0"
@@ -38,6 +39,6 @@ def __getattr__(name: str) -> Any:
         moved = (f"{module}.{name}" for module in _MOVED if name in importlib.import_module(f"contin.{module}").__all__)
         place = _RENAMED.get(name) or next(moved, None)
         if place is None:
-            raise
+            raise AttributeError(f"contin has no {name!r}{meant(name, __all__)}") from None
     warn(f"contin.{name} is contin.{place} now", DeprecationWarning)
     return operator.attrgetter(place)(sys.modules[__name__])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import functools
+import inspect
 import math
 import os
 import sys
@@ -212,7 +213,8 @@ Positive = Annotated[float, Within(0)]
 def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     """Return a public function that compares its arguments with its annotations before it runs.
 
-    A wrong one is a `ProblemError` that names it. What annotations do not say, the function itself checks.
+    A wrong one is a `ProblemError` that names it; so is a keyword that there is not, with the one that was probably meant. What
+    annotations do not say, the function itself checks.
 
     Examples
     --------
@@ -227,12 +229,48 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     @functools.wraps(function)
     def checked(*given: _Given.args, **named: _Given.kwargs) -> _Result:
         hints, names = _annotations(function)
+        refuse_unknown(function, named)
         for name, value in (*zip(names, given), *named.items()):
             if said := _refusal(name, value, hints.get(name, Any)):
                 raise ProblemError(said)
         return function(*given, **named)
 
     return checked
+
+
+@functools.cache
+def _keywords(function: Callable[..., Any]) -> list[str]:
+    """Return the names of the arguments of a function, with those of the TypedDict that stands behind ``**``."""
+    found: list[str] = []
+    for name, one in inspect.signature(function).parameters.items():
+        more = one.kind is one.VAR_KEYWORD
+        found += typing.get_args(typing.get_type_hints(function)[name])[0].__annotations__ if more else [name]
+    return [name for name in found if name != "self"]
+
+
+def refuse_unknown(function: Callable[..., Any], named: Iterable[str]) -> None:
+    """Require that keywords are arguments of a function."""
+    known = _keywords(function)
+    for name in named:
+        if name not in known:
+            raise ProblemError(f"there is no argument {name!r}{meant(name, known)}; known are {listed(known)}")
+
+
+class Named:
+    """A class whose keywords are compared with the arguments of its constructor, as `arguments` does.
+
+    Examples
+    --------
+    >>> import contin
+    >>> contin.Newton(tol=1e-9)
+    Traceback (most recent call last):
+    contin.errors.ProblemError: there is no argument 'tol'; known are tolerance, max_iterations
+    """
+
+    def __new__(cls, *given: object, **named: object) -> Any:
+        """Compare the keywords."""
+        refuse_unknown(cls.__init__, named)
+        return super().__new__(cls)
 
 
 def fields(record: object) -> None:

@@ -330,7 +330,7 @@ Quantity = float | str | Function
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
+class Segment(checks.Named):
     """One interval of a `SegmentedProblem`, with its own equations.
 
     Parameters

@@ -314,7 +314,7 @@ def _check_names(
 
 
 @dataclass(frozen=True, eq=False)
-class VariationalSegment:
+class VariationalSegment(checks.Named):
     """One interval of a `SegmentedVariationalProblem`: what varies there, and its energy.
 
     Parameters

@@ -126,7 +126,7 @@ _TOO_LARGE = 1.5
 
 
 @dataclass(frozen=True)
-class MeshControl:
+class MeshControl(checks.Named):
     """How the mesh adapts.
 
     Attributes

@@ -39,7 +39,7 @@ Sizes = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(checks.Named):
     """How to correct: stop when the estimated error of every component is below ``tolerance`` (1 + |x|).
 
     ``tolerance`` may be as small as round-off; iterations that stagnate there count as converged.

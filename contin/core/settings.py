@@ -26,7 +26,7 @@ _LEFT = 0.1
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(checks.Named):
     """What to follow, how carefully, and where to stop. Frozen, checked when made.
 
     Attributes
@@ -116,9 +116,9 @@ class Settings:
         for name, value in {**dict.fromkeys(_FIRST_NAMES, ()), **_by_new_name(given)}.items():
             object.__setattr__(self, name, value)
         self._check_columns()
-        checks.fields(self)
         if not checks.is_number(self.direction) or self.direction not in (1, -1):
-            raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1")
+            raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1 ('both' for trace and curve)")
+        checks.fields(self)
         if not self.min_step <= self.step <= self.max_step:
             bounds = f"min_step = {exact_text(self.min_step)} and max_step = {checks.shown(self.max_step)}"
             raise ProblemError(f"step: {exact_text(self.step)} must lie between {bounds}")
@@ -162,6 +162,7 @@ def check(system: Discretization, settings: Settings) -> None:
     for name in (*settings.limits, *settings.zeros, *settings.extrema, *trivial):
         if name not in known:
             raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)}){meant(name, known)}")
+    checks.chosen("scales", list(settings.scales), [*dict.fromkeys((*known, *system.problem.states))])
 
 
 class Options(TypedDict, total=False):
@@ -196,12 +197,7 @@ class Options(TypedDict, total=False):
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
     """Return the settings with some fields changed; raise ProblemError for an unknown field, or a value that it cannot have."""
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
-    known = [entry.name for entry in dataclasses.fields(Settings) if entry.name not in _FIRST_NAMES]
-    options = _by_new_name(options)
-    for name in options:
-        if name not in known:
-            raise ProblemError(f"there is no setting {name!r}{meant(name, known)}; known are {', '.join(known)}")
-    settings = settings or Settings()
+    options, settings = _by_new_name(options), settings or Settings()
     if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
         options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}
     return dataclasses.replace(settings, **options)

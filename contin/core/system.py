@@ -28,6 +28,7 @@ from contin.functions.origin import condition
 from contin.levels import LAST_PLACES
 from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
+from contin.text import meant
 
 #: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
 #: numbers, and small ones less.
@@ -165,7 +166,7 @@ class System(Discretization):
         names = tuple(problem.parameters)
         for name in (*self.free, *parameters):
             if name not in names:
-                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
+                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}{meant(name, names)}")
         self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
         self._free = self._indices(self.free)
         self.scales = scales or nothing_scaled(len(problem.states), len(names), self._rows)

@@ -174,7 +174,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Event:
+class Event(checks.Named):
     """A function of a trial point whose zeros are special points.
 
     Attributes

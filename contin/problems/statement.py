@@ -56,7 +56,7 @@ class Statement(Protocol):
         """Return some of the functions, compiled."""
 
 
-class Restated:
+class Restated(checks.Named):
     """A statement that can be pickled and compared: it is data.
 
     Functions that other processes can import are pickled by name, all others as recordings. Two problems are equal if they are
@@ -120,7 +120,7 @@ class Restated:
 
     def __new__(cls, *arguments: object, **options: object) -> Any:
         """Note the arguments."""
-        made = super().__new__(cls)
+        made = super().__new__(cls, *arguments, **options)
         names = list(inspect.signature(cls.__init__).parameters)[1:]
         made._keep(_stated={**dict(zip(names, arguments)), **options})
         return made

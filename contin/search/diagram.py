@@ -27,6 +27,7 @@ from contin.results.point import Point
 from contin.results.record import system_of
 from contin.search.further import Search, Searched, Site, Symmetry, are_one, check_maps, image, seen
 from contin.search.trace import switched, switches
+from contin.text import meant
 
 
 def _is_end(point: Point) -> bool:
@@ -151,8 +152,11 @@ class _Explorer:
     def _run(self, system: Discretization, x: Array, settings: Settings, tangent: Array | None = None) -> Continuation:
         """Return a run; settings that name columns of the other kind of branch (equilibria, cycles) do not count."""
         known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
-        limits, zeros = ({name: given[name] for name in given if name in known} for given in (settings.limits, settings.zeros))
-        return Continuation(system, x, dataclasses.replace(settings, limits=limits, zeros=zeros), tangent)
+        own = {"limits": known, "zeros": known, "scales": (*known, *system.problem.states)}
+        given: dict[str, Any] = {
+            field: {name: one for name, one in getattr(settings, field).items() if name in own[field]} for field in own
+        }
+        return Continuation(system, x, dataclasses.replace(settings, **given), tangent)
 
     def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
         """Follow one run to its end, or to a known branch. Half-branches that it passes at junctions count as taken."""
@@ -347,4 +351,4 @@ def _check_columns(system: Discretization, settings: Settings) -> None:
         known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
     for name in (*settings.limits, *settings.zeros):
         if name not in known:
-            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)}){meant(name, known)}")

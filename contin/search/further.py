@@ -104,7 +104,7 @@ _DRAWS = 8
 
 
 @dataclass(frozen=True)
-class Search:
+class Search(checks.Named):
     """Where and how `diagram` looks for solutions that no branch has reached.
 
     Attributes

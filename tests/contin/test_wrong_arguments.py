@@ -146,6 +146,34 @@ def test_the_sentence_names_the_argument(call, sentence):
     assert sentence in str(told.value)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_keyword_that_there_is_not_is_named_with_the_one_that_was_meant(calls):
+    for call, right in (one for name, one in calls.items() if name in contin.__all__ or "." in name):
+        known = list(inspect.signature(call).parameters)
+        with pytest.raises(contin.ProblemError, match="there is no argument 'wrong_one'; known are "):
+            call(**right, wrong_one=1)
+        with pytest.raises(contin.ProblemError, match=f"did you mean '{known[0]}'"):
+            call(**right, **{f"{known[0]}_": 1})
+
+
+@pytest.mark.parametrize("call, sentence", [
+    (lambda start: contin.trace(start, limt={"a": (0, 1)}), "no argument 'limt' (did you mean 'limits'?)"),
+    (lambda start: contin.trace(start, freee=["a"]), "no argument 'freee' (did you mean 'free'?)"),
+    (lambda start: contin.trace(start, direction="booth"), "direction: 'booth' must be +1 or -1 ('both' for trace"),
+    (lambda start: contin.trace(start, free=["a"], scales={"X": 1}), "scales: 'X' must be one of a, b, x (did you mean 'x'?)"),
+    (lambda start: contin.solve(PARABOLA, [1.0], {"aa": 1.0}), "parameter 'aa' is not one of a, b (did you mean 'a'?)"),
+])  # fmt: skip
+def test_the_sentence_names_what_was_meant(call, sentence):
+    with pytest.raises(contin.ProblemError) as told:
+        call(contin.solve(PARABOLA, [1.0]))
+    assert sentence in str(told.value)
+
+
+def test_a_public_name_that_there_is_not_is_named_with_the_one_that_was_meant():
+    with pytest.raises(AttributeError, match=r"contin has no 'trase' \(did you mean 'trace'\?\)"):
+        contin.trase  # noqa: B018
+
+
 def test_none_is_taken_where_it_is_the_default():
     """Also where the annotation has bounds."""
     assert contin.solve(PARABOLA, [1.0], degree=None, mesh=None)["x"] == pytest.approx(1.0)

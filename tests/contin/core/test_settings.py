@@ -42,5 +42,5 @@ def test_so_are_those_of_newton_and_of_the_mesh(make, said):
 def test_options_replace_fields():
     settings = settings_with(Settings(step=0.1), {"direction": -1})
     assert (settings.step, settings.direction) == (0.1, -1)
-    with pytest.raises(ProblemError, match=r"no setting 'stepp' \(did you mean 'step'\?\); known are primary, direction"):
+    with pytest.raises(ProblemError, match=r"no argument 'stepp' \(did you mean 'step'\?\); known are primary, direction"):
         settings_with(None, {"stepp": 0.1})
