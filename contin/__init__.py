@@ -19,7 +19,6 @@ from typing import Any
 import lazy_loader
 
 from contin.errors import warn
-from contin.text import meant
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
 __version__ = "0.3.0"
@@ -39,6 +38,8 @@ def __getattr__(name: str) -> Any:
         moved = (f"{module}.{name}" for module in _MOVED if name in importlib.import_module(f"contin.{module}").__all__)
         place = _RENAMED.get(name) or next(moved, None)
         if place is None:
+            from contin.text import meant  # `contin.lowlevel` takes its own names out of this module
+
             raise AttributeError(f"contin has no {name!r}{meant(name, __all__)}") from None
     warn(f"contin.{name} is contin.{place} now", DeprecationWarning)
     return operator.attrgetter(place)(sys.modules[__name__])

@@ -170,6 +170,7 @@ def test_the_sentence_names_what_was_meant(call, sentence):
 
 
 def test_a_public_name_that_there_is_not_is_named_with_the_one_that_was_meant():
+    assert lowlevel.meant("trase", ["trace"])  # `contin` does not have this name from here on
     with pytest.raises(AttributeError, match=r"contin has no 'trase' \(did you mean 'trace'\?\)"):
         contin.trase  # noqa: B018
 
