@@ -43,10 +43,13 @@ def main(argv=None) -> int:
         return 0
     if words[:1] == ["--version"]:
         import platform
-        from importlib.metadata import version
 
-        parts = (f"Python {platform.python_version()}", f"numpy {version('numpy')}", platform.platform())
-        sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')} ({', '.join(parts)})\n")
+        import numpy
+
+        import contin
+
+        parts = (f"Python {platform.python_version()}", f"numpy {numpy.__version__}", platform.platform())
+        sys.stdout.write(f"ribbon-continuation {contin.__version__} ({', '.join(parts)})\n")
         return 0
     if words[:1] == ["completion"]:
         return _complete(words[1:])

@@ -59,7 +59,10 @@ class Statement:
             setattr(self, name, ends.unit(name, getattr(self, name)))
         for name in self.phases:
             if isinstance(name, str) and (name not in PHASES or len(self.members) > 1):
-                raise ValueError(f"phases: {one_of(name, PHASES)}, for one strip")
+                what = (
+                    f"{name!r} is for one strip, and here are {len(self.members)}" if name in PHASES else one_of(name, PHASES)
+                )
+                raise ValueError(f"phases: {what}")
         self.phases = tuple(PHASES[one] if isinstance(one, str) else one for one in self.phases)
         self._check()
         ends.check_known(self.numbers, self.known)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar
@@ -82,6 +83,12 @@ def show(value: object) -> str:
     """Return a value for a message, at most 60 letters of it."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def alone(value: object) -> str:
+    """Return what to write in place of a number with a unit, where it has none; '' for other values."""
+    has_unit = isinstance(value, str) and re.match(r"\s*[-+]?\.?\d[\d.]*\s*[^\W\d]", value)
+    return "; write the number alone, in a scene with dimensions in m, rad, N, N m, N/m, 1/m" if has_unit else ""
 
 
 def plain(text: str) -> str:

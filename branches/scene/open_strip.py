@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from branches.scene.fields import ConfigError, Interval, MeshConfig, Scene, StepConfig, Strict, show
+from branches.scene.fields import ConfigError, Interval, MeshConfig, Scene, StepConfig, Strict, alone, show
 from branches.scene.units import STRIP_UNITS, UNITS, quantity, unusual
 from contin.lowlevel import exact_text, meant, one_of
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, Vector, perpendicular, unit
@@ -359,9 +359,10 @@ class StagedScene(Scene):
         for number, stage in enumerate(self.stages, 1):
             if stage.stage is not None and stage.stage >= number:
                 raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
-            parameters = self.strip(number).parameters
+            parameters = (strip := self.strip(number)).parameters
             if stage.follow not in parameters:
-                raise ValueError(f"stage {number}: follow: {one_of(stage.follow, parameters, 'the numbers here: ')}")
+                known = [name for name in dict.fromkeys((*parameters, *strip.known)) if name != stage.follow]
+                raise ValueError(f"stage {number}: follow: {one_of(stage.follow, known, 'the numbers here: ')}")
             if number == 1 and (stage.start_at or stage.stage):
                 raise ValueError("stage 1: start_at: the first stage starts from the first state")
             for name in stage.numbers:
@@ -565,7 +566,7 @@ def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:
     found = {}
     for name, value in values.items():
         if isinstance(value, str) and not (name == "B2" and value == "inf"):
-            raise ValueError(f"{what}: {name}: must be a number, not {value!r}")
+            raise ValueError(f"{what}: {name}: must be a number, not {value!r}{alone(value)}")
         if not name.isidentifier():
             raise ValueError(f"{what}: {name!r} is not usable as a name")
         found[name] = math.inf if isinstance(value, str) else value

@@ -12,7 +12,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from branches.scene.closed import ClosedScene
-from branches.scene.fields import ConfigError, Scene, missing, plain, show, unknown
+from branches.scene.fields import ConfigError, Scene, alone, missing, plain, show, unknown
 from contin.lowlevel import meant
 
 if TYPE_CHECKING:
@@ -176,7 +176,8 @@ def _at(value: object, pattern: Sequence[str], place: tuple = ()) -> Iterator[tu
 
 #: Words of pydantic, and ours for them.
 _OURS = {
-    "Input should be": "must be", "a valid integer": "a whole number", "a valid boolean": "true or false",
+    "Input should be": "must be", "List should": "must",
+    "a valid integer": "a whole number", "a valid boolean": "true or false",
     "a valid number": "a number", "a valid string": "text", "a valid list": "a list",
     "a valid dictionary": "`key: value` fields",
     "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "above", "less than": "below",
@@ -221,7 +222,9 @@ def _sentence(error: ValidationError, model: type[BaseModel]) -> str:
     else:
         for words, ours in _OURS.items():
             message = message.replace(words, ours)
-        text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
+        counted = "after validation" in message  # pydantic's words about lists that are too long or too short
+        value = "" if counted else f", not {show(first['input'])}{alone(first['input'])}"
+        text = f"{where}: {message[0].lower()}{message[1:].replace(' after validation', '')}{value}"
         if kind == "literal_error":
             text += meant(str(first["input"]), re.findall("'([^']+)'", first["ctx"]["expected"]))
     return text + (f" (and {len(errors) - told} more)" if len(errors) > told else "")

@@ -207,9 +207,9 @@ def prepare(path: Path) -> None:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
-def check_picture(path: Path) -> None:
+def check_picture(path: Path, option: str = "--out") -> None:
     """Raise StoreError if ``path`` is not a picture that can be written."""
-    check_name(path, (".pdf", ".svg", ".png"))
+    check_name(path, (".pdf", ".svg", ".png"), option)
     prepare(path)
 
 

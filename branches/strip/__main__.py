@@ -55,8 +55,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = vars(parser().parse_args(argv))
     names = ("yield_strain", "want", "chart", "turns", "quiet", "distance", "ends", "push_at")
     asked = {name: options.pop(name) for name in names}
-    _check(asked, options["natural_radius"])
-    _answer(Strip(**(options if asked["distance"] is None else options | {"natural_radius": math.inf})), asked)
+    try:
+        _check(asked, options["natural_radius"])
+        strip = Strip(**(options if asked["distance"] is None else options | {"natural_radius": math.inf}))
+    except ValueError as error:
+        name, _, what = str(error).partition(":")
+        raise ValueError(f"--{name.replace('_', '-')}:{what}") from error
+    _answer(strip, asked)
     return 0
 
 
@@ -77,9 +82,9 @@ def _check(asked: dict, natural_radius: float | None) -> None:
     if turns is not None and not (turns % 2 and 1 <= turns <= MOST_COVERINGS):
         raise ValueError(f"turns: {turns} must be odd, from 1 to {MOST_COVERINGS}: a loop cannot be folded into others")
     if turns is not None and asked["want"] is None and asked["chart"] is None:
-        raise ValueError("turns: it belongs to want or chart, and neither is given")
+        raise ValueError("turns: it belongs to --want or --chart, and neither is given")
     if asked["chart"] is not None:
-        check_picture(Path(asked["chart"]))
+        check_picture(Path(asked["chart"]), "--chart")
 
 
 def _answer(strip: Strip, asked: dict) -> None:

@@ -34,7 +34,7 @@ def push(strip: Strip, distance: float, ends: str = "clamped", at: float = 0.5) 
     """
     low = _NEAREST * strip.length
     if not low <= distance < strip.length:
-        raise ValueError(f"distance: {distance:g} m must be from {low:g} m to below the length, {strip.length:g} m")
+        raise ValueError(f"--distance: {distance:g} m must be from {low:g} m to below the length, {strip.length:g} m")
     sizes: dict = {name: getattr(strip, name) for name in ("width", "thickness", "length", "poisson_ratio", "youngs_modulus")}
     follow = {"follow": "roller", "to": -distance / 2, "limits": {"roller": [-strip.length / 2, strip.length / 2]}}
     scene = parse(json.dumps({

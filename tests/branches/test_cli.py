@@ -59,7 +59,7 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
 def test_a_negative_number_with_a_unit_is_a_value(call):
     words = ["--width", "5mm", "--thickness", "0.1mm", "--length", "1m", "--poisson-ratio", "0.3", "--youngs-modulus", "1GPa"]
     done = call(strip.main, *words, "--natural-radius", "-30mm")
-    assert done.returncode == 2 and "natural_radius: -0.03 must be positive" in done.err
+    assert done.returncode == 2 and "--natural-radius: -0.03 must be positive" in done.err
 
 
 @pytest.mark.full

@@ -252,12 +252,12 @@ def test_the_snap_load_of_a_shallow_arch_between_hinges(excess=4e-4):
 def test_options_of_closed_strips_are_not_of_open_ones(call):
     given = ["--width", "1cm", "--thickness", ".5mm", "--length", ".4", "--poisson-ratio", ".3", "--youngs-modulus", "200GPa"]
     for more, said in (
-        ([], "natural_radius: a closed strip needs it"),
+        ([], "--natural-radius: a closed strip needs it"),
         (["--distance", ".39", "--natural-radius", "1"], "one with a distance has none"),
-        (["--ends", "hinged", "--natural-radius", "1"], "ends: is of open strips"),
-        (["--distance", ".39", "--turns", "3"], "turns: is of closed strips"),
-        (["--distance", ".5"], "distance: 0.5 m must be from 0.24 m to below the length, 0.4 m"),
-        (["--distance", ".39", "--push-at", "1.5"], "push_at: 1.5 must be above 0 and below 1"),
+        (["--ends", "hinged", "--natural-radius", "1"], "--ends: is of open strips"),
+        (["--distance", ".39", "--turns", "3"], "--turns: is of closed strips"),
+        (["--distance", ".5"], "--distance: 0.5 m must be from 0.24 m to below the length, 0.4 m"),
+        (["--distance", ".39", "--push-at", "1.5"], "--push-at: 1.5 must be above 0 and below 1"),
     ):
         done = call(main, *given, *more)
         assert done.returncode == 2 and said in done.err and done.err.count("\n") == 1
@@ -327,14 +327,14 @@ def test_scenes_that_are_refused(settings, words):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"--width": "0"}, "width: 0 must be positive and finite"),
+        ({"--width": "0"}, "--width: 0 must be positive and finite"),
         ({"--width": "x"}, "argument --width: 'x' must be a number (in m), or one with a unit"),
-        ({"--natural-radius": "nan"}, "natural_radius: nan must be positive"),
-        ({"--yield-strain": "-1"}, "yield_strain: -1 must be positive and finite"),
-        ({"--want": "0"}, "want: 0 must be positive and finite"),
-        ({"--want": "1", "--turns": "2"}, "turns: 2 must be odd, from 1 to 15"),
-        ({"--turns": "3"}, "turns: it belongs to want or chart"),
-        ({"--chart": "chart.xyz"}, "chart.xyz"),
+        ({"--natural-radius": "nan"}, "--natural-radius: nan must be positive"),
+        ({"--yield-strain": "-1"}, "--yield-strain: -1 must be positive and finite"),
+        ({"--want": "0"}, "--want: 0 must be positive and finite"),
+        ({"--want": "1", "--turns": "2"}, "--turns: 2 must be odd, from 1 to 15"),
+        ({"--turns": "3"}, "--turns: it belongs to --want or --chart"),
+        ({"--chart": "chart.xyz"}, "--chart 'chart.xyz': must end in .pdf"),
     ],
 )
 def test_strips_that_are_refused(changed, words, capsys):
