@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.draw.style import smooth
+from branches.draw.style import NU, smooth
 from branches.export.__main__ import labelled_point
 from branches.scene.fields import ConfigError
 from branches.store.branch import StoredBranch
 from branches.store.command import Parser, complain, write_output
-from branches.store.files import StoreError, check_picture, prepare, write_bytes, write_picture
+from branches.store.files import StoreError, check_name, prepare, write_bytes, write_picture
 from branches.store.read import read_branch
 from contin import Branch, ContinError, curve
 from contin.lowlevel import Label, one_of, point_of
@@ -55,8 +55,9 @@ def main(argv=None) -> int:
     """Follow; return the exit code."""
     options = parser().parse_args(argv)
     try:
-        out = Path(options.out or ".csv")
-        (prepare if out.name.endswith(".csv") else check_picture)(out)
+        out = Path(options.out or "folds.csv")
+        check_name(out, (".csv", ".pdf", ".svg", ".png"))
+        prepare(out)
         branch = read_branch(options.result)
         point = labelled_point(branch, options.point)
         found = follow(branch, point, options.against, options.between)
@@ -85,7 +86,7 @@ def _figure(branch: StoredBranch, names, values):
     axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
     axes.plot(*values, color="black")
     across, up = (branch.axis(name)[1] for name in names)
-    axes.set(xlabel=across, ylabel=up, title=f"folds of {branch.about.partition(', nu')[0]}")
+    axes.set(xlabel=across, ylabel=up, title=f"folds of {branch.caption.partition(f', {NU}')[0]}")
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -157,6 +158,28 @@ class ClosedScene(Scene):
     @property
     def cautions(self) -> list[str]:
         return unusual(self.strip or {})
+
+    @functools.cached_property
+    def _units(self) -> dict[str, tuple[float, str]]:
+        """What columns are multiplied by, and their units, where the sizes of the strip are given."""
+        if not self.strip:
+            return {}
+        from ribbon_model.strip import Strip
+
+        real = Strip(**self.strip)
+        units = {
+            "energy": (real.energy_unit, "J"),
+            "M": (real.moment_unit, "N m"),
+            "R": (real.moment_unit / real.radius(1), "N"),
+        }
+        units = {name: units[name.rstrip("123")] for name in ("energy", "M1", "M2", "M3", "R1", "R2", "R3")}
+        return units | {"kappa_n": (1 / real.radius(1), "1/m"), "elastic": units["energy"], "length": (real.radius(1), "m")}
+
+    def factor(self, column: str) -> float:
+        return self._units.get(column, (1.0, ""))[0]
+
+    def unit(self, column: str) -> str:
+        return self._units.get(column, (1.0, ""))[1]
 
     # --- names of files -------------------------------------------------------------------------------------------------
 

@@ -64,6 +64,7 @@ class ClosedStage(Stage):
     def __init__(self, scene: ClosedScene):
         self.scene, self.law, domain = scene, LAWS[scene.law], DOMAINS[scene.domain]
         self.problem, self.free, self.watch = domain.problem(self.law), domain.free, None
+        self.title = "kappa_n in 1/m, energy in J\n" if scene.strip else ""
 
     # --- the run --------------------------------------------------------------------------------------------------------
 
@@ -163,10 +164,8 @@ class ClosedStage(Stage):
     # --- words ----------------------------------------------------------------------------------------------------------
 
     def row(self, point: Point, step: float) -> str:
-        return (
-            f"{point['kappa_n']:14.8f}  {point['kappa_star']:14.8f}"
-            f"  {point['energy']:14.8f}  {step:8.1e} {point.system.intervals:3d} {point.iterations:3d}"
-        )
+        values = (f"{point[name] * self.scene.factor(name):14.8f}" for name in ("kappa_n", "kappa_star", "energy"))
+        return f"{'  '.join(values)}  {step:8.1e} {point.system.intervals:3d} {point.iterations:3d}"
 
     def describe(self, event: np.void, largest: float) -> str:
         scene = self.scene
@@ -176,6 +175,9 @@ class ClosedStage(Stage):
         held = label == b"UZ" or (label == b"EP" and not found)  # kappa_n was given, not found
         error = event["error_kappa_n"]
         certain = "" if held or math.isnan(error) else f" (± {error:.0e})"
+        if scene.strip:
+            radius = 1e3 / (event["kappa_n"] * scene.factor("kappa_n") or math.inf)
+            certain += f", natural radius {radius:.6g} mm"
         if name == START and scene.origin:
             return f"leaves the branch ({scene.m}, {scene.n}) at {place}{certain}, {scene.origin.mode}"
         if name == START:

@@ -307,7 +307,8 @@ class OpenStage(Stage):
         others = "".join(f", {text}" for text in (self._with_error(event, column) for column in shown) if text)
         singular = label_of(label).singular
         found = f" (± {error:.0e})" if singular and not math.isnan(error) else ""
-        place = f"{name} = {_rounded(without_round_off(event[name], largest) * factor, error)}{found}"
+        value = _rounded(without_round_off(event[name], largest) * factor, error)
+        place = f"{name} = {value} {self.scene.unit(name)}".rstrip() + found
         what = event["name"].decode()
         change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
         broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
@@ -361,8 +362,7 @@ class OpenStage(Stage):
         if f"error_{column}" not in event.dtype.names or math.isnan(event[f"error_{column}"]):
             return ""
         value, error = (event[field] * self.scene.factor(column) for field in (column, f"error_{column}"))
-        unit = self.scene.unit(column)
-        return f"{column} = {_rounded(value, error)}{f' {unit}' if unit else ''} (± {error:.0e})"
+        return f"{column} = {_rounded(value, error)} {self.scene.unit(column)}".rstrip() + f" (± {error:.0e})"
 
 
 def _rounded(value: float, error: float) -> str:

@@ -24,8 +24,8 @@ from ribbon_model.strip import Strip
 
 #: Strips that are compared to see from which side to look; a tenth of them may miss how a strip turns over.
 _BETWEEN = 60
-#: The end of the words of curvatures, which says what they are multiplied by.
-_OVER = "L/2π"
+#: Ends of words of axes, which say what a curvature is multiplied by, and what an energy is over.
+_OVER, _IN_UNITS = "L/2π", ", in units 2πB/L"
 #: Kinds of `branches.scene.labels` that a legend says in other words, or not at all.
 _WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle", "branch point": None}
 
@@ -40,7 +40,7 @@ class ClosedBranch(StoredBranch):
         return ("point", "label", "name", "kappa_n", "kappa_star", "energy")
 
     def place(self, row: int) -> str:
-        return f"kappa_n = {self.events['kappa_n'][row]:.4f}"
+        return f"kappa_n = {self.events['kappa_n'][row] * self.scene.factor('kappa_n'):.4f} {self._unit('kappa_n')}".rstrip()
 
     def solution(self, point: int) -> Solution:
         t, states = self.states_at(point)
@@ -83,14 +83,9 @@ class ClosedBranch(StoredBranch):
         secondary = "secondary branch of " if scene.origin else ""
         return f"{what}, {secondary}(m, n) = ({scene.m}, {scene.n}){in_words(and_nu(scene.law, scene.nu, NU))}"
 
-    def measured(self, name: str) -> tuple[np.ndarray, str]:
-        """As `StoredBranch.measured`; curvatures are in 1/m if the scene has the sizes of its strip."""
-        if self.scene.strip and super().axis_words(name).endswith(_OVER):
-            return 2 * math.pi / self.length * self.column(name), "1/m"
-        return super().measured(name)
-
     def axis_words(self, name: str) -> str:
-        return super().axis_words(name).removesuffix(_OVER if self.scene.strip else "")
+        words = super().axis_words(name)
+        return words.removesuffix(_OVER).removesuffix(_IN_UNITS) if self.scene.unit(name) else words
 
     def marks(self) -> Iterator[Mark]:
         for event in self.events:

@@ -32,7 +32,7 @@ def test_folds_against_nu_are_those_of_the_quadrature(folder, call):
         (["--against", "nnu", "--between", "0", "1"], "--against: 'nnu' (did you mean 'nu'?) must be one of nu"),
         (["--against", "nu", "--between", "0.4", "0.5"], "--between: must hold the value of the result, nu = 0.3"),
         (["--against", "nu", "--between", "0", "0.5", "--point", "1"], "--point: must be a fold (LP)"),
-        (["--against", "nu", "--between", "0", "0.5", "-o", "x.txt"], "must end in .pdf, .svg or .png"),
+        (["--against", "nu", "--between", "0", "0.5", "-o", "x.txt"], "must end in .csv, .pdf, .svg or .png"),
     ],
 )
 def test_what_is_no_curve_is_refused(words, said, folder, call):

@@ -1,5 +1,7 @@
 """Strips in SI units: the numbers they resolve to, what the command says of them, and what is refused."""
 
+import contextlib
+import io
 import math
 import re
 import shlex
@@ -9,7 +11,10 @@ from functools import partial
 import numpy as np
 import pytest
 
+from branches.read import read_branch
 from branches.run.__main__ import main as run_command
+from branches.run.display import Display
+from branches.run.runner import run_scene
 from branches.scene.fields import ConfigError
 from branches.scene.parse import dump, load, parse
 from branches.scene.sweep import Sweep
@@ -73,6 +78,24 @@ def test_metres_with_the_numbers_of_millimetres_get_a_caution(tmp_path, call):
     assert [line.split()[1] for line in others] == ["length"]
     (tmp_path / "y.yaml").write_text(SCENE.replace("2\n", "2\nsteps: {max_points: 2}\n"))
     assert call(run_command, "y.yaml", "--quiet").err == ""
+
+
+def test_a_branch_of_a_strip_with_sizes_is_told_in_si_units(tmp_path):
+    """The circle has kappa_n = 1/r_n where its natural radius is r_n; the units of M1 and energy are B 2 pi/L, B (2 pi)^2/L."""
+    lines = io.StringIO()
+    with contextlib.redirect_stdout(lines):
+        run_scene(parse(SCENE + "steps: {max_points: 3}\n", "scene"), tmp_path / "x.h5", Display())
+    branch, turn = read_branch(tmp_path / "x.h5"), 2 * math.pi / 0.6
+    stiffness, table = 200e9 * 0.00012**3 / 12 / (1 - 0.3**2) * 0.016, branch.in_units()
+    for name, size in {
+        "kappa_n [1/m]": turn,
+        "M1 [N m]": stiffness * turn,
+        "energy [J]": stiffness * 2 * math.pi * turn,
+    }.items():
+        np.testing.assert_allclose(table[name], size * branch.points[name.partition(" ")[0]], rtol=1e-12)
+    first = table["kappa_n [1/m]"][0]
+    assert f"natural radius {1e3 / first:.6g} mm" in lines.getvalue() and f"{first:.8f}  " in lines.getvalue()
+    assert branch.place(0) == f"kappa_n = {first:.4f} 1/m" and branch.axis("elastic")[1].endswith("κₙ²/2) in J")
 
 
 def test_dimensions_of_scenes_with_units():
