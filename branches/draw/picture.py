@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -116,7 +117,7 @@ def weight_arrow(axes, reach: float, view: View) -> None:
     tail = np.array([-0.9, -0.2]) * reach
     style = {"arrowstyle": "-|>", "color": OTHER, "lw": points(1.4), "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tail + 0.4 * reach * down, tail, arrowprops=style)
-    axes.annotate("weight", tail, (4, -4), textcoords="offset points", va="top", fontsize=points(9), color=OTHER)
+    axes.annotate("weight", tail, (0, 2), textcoords="offset points", fontsize=points(9), color=OTHER)
 
 
 def _stages(branch, followed: str) -> list[int]:
@@ -178,8 +179,9 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True, mea
         if snap.column == columns[0] and columns[1] in snap.to:
             target = snap.to[columns[1]] * branch.scene.factor(columns[1])
             _arrow(axes, (across[snap.row], up[snap.row]), target, branch.words_of("energy", snap.released))
-    for (_, words), place in zip(axis, (axes.set_xlabel, axes.set_ylabel)):
-        place(words, fontsize=points(12))
+    letters = np.array(axes.get_window_extent().size) / (axes.figure.dpi / 72 * 2 * _WIDE * points(12) / 11)
+    for (_, words), place, most in zip(axis, (axes.set_xlabel, axes.set_ylabel), letters):
+        place(textwrap.fill(words, len(words) // math.ceil(len(words) / most) + 4), fontsize=points(12))
     axes.tick_params(labelsize=points(11))
     axes.grid(alpha=0.25)
     axes.margins(0.16, 0.12)

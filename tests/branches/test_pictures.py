@@ -330,6 +330,11 @@ def test_a_picture_for_a_column_of_a_journal(stroke):
     small, large = ({text.get_fontsize() for text in one.findobj(Text) if text.get_text()} for one in (narrow, usual))
     assert sorted(small) == pytest.approx(sorted(0.65 * size for size in large)) and min(small) > 5.8
     assert usual.get_size_inches()[0] == 9
+    narrow.draw_without_rendering()
+    for axes in every_axes(narrow):  # words of axes are no longer than these, and inside the picture
+        box, whole = axes.get_tightbbox(), narrow.bbox.padded(2)
+        assert whole.x0 < box.x0 and box.x1 < whole.x1 and whole.y0 < box.y0 and box.y1 < whole.y1
+        assert axes.yaxis.label.get_window_extent().height < 1.2 * axes.bbox.height
 
 
 @pytest.mark.parametrize(
