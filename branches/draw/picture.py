@@ -179,7 +179,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True, mea
         if snap.column == columns[0] and columns[1] in snap.to:
             target = snap.to[columns[1]] * branch.scene.factor(columns[1])
             _arrow(axes, (across[snap.row], up[snap.row]), target, branch.words_of("energy", snap.released))
-    letters = np.array(axes.get_window_extent().size) / (axes.figure.dpi / 72 * 2 * _WIDE * points(12) / 11)
+    letters = np.array(axes.get_window_extent().size) / (axes.figure.dpi / 72 * points(2 * _WIDE))
     for (_, words), place, most in zip(axis, (axes.set_xlabel, axes.set_ylabel), letters):
         place(textwrap.fill(words, len(words) // math.ceil(len(words) / most) + 4), fontsize=points(12))
     axes.tick_params(labelsize=points(11))

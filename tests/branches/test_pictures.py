@@ -362,6 +362,9 @@ def test_measured_points_are_drawn_over_a_branch_and_a_diagram(tmp_path, call, r
         axes = figure(stroke, 0, x="stroke", y="F_stroke", measured=measured).axes[0]
         assert len(axes.containers) == drawn
         assert sum(np.array_equal(line.get_xdata(), found["stroke"]) for line in axes.lines) == drawn
+    table.write_text('# of a spreadsheet\n"stroke [mm]","F_stroke [mN]"\n"1","-500"\n')
+    found = read_points(table, units)
+    assert (*found["stroke"], *found["F_stroke"]) == pytest.approx((0.001, -0.5))
     table.write_text("kappa_n,kappa_star\n2.6,1.04\n")
     assert call(plot.main, root / "configs" / "m1_n2.yaml", "--points", table, "-o", tmp_path / "x.png").returncode == 0
 
@@ -373,6 +376,8 @@ def test_measured_points_are_drawn_over_a_branch_and_a_diagram(tmp_path, call, r
         ("kappa_n [1/m],kappa_star\n1,2\n", "kappa_n: is given in '1/m', and must be in no unit"),
         ("kappa_n,kappa_star\n1\n", "line 2 has 1 values, and the first line names 2 columns"),
         ("kappa_n,kappa_star\n1,x\n", "line 2: kappa_star: 'x' must be a number"),
+        ("kappa_n,kappa_star\n1,1e400\n", "line 2: kappa_star: 1e400 must be a finite number"),
+        ("kappa_n,kappa_star,error_kappa_star\n1,2,-1\n", "line 2: error_kappa_star: -1 must be at least 0"),
         ("kappa_n,kappa_n\n1,1\n", "the column 'kappa_n' is named twice"),
         ("kappa_n\n1\n", "must hold both columns of a picture, kappa_n and kappa_star, and holds kappa_n"),
         ("kappa_n,kappa_star\n", "must hold a line of names of columns and lines of numbers; it has 1 lines"),
