@@ -59,6 +59,8 @@ def main(argv=None) -> int:
         check_name(out, (".csv", ".pdf", ".svg", ".png"))
         prepare(out)
         branch = read_branch(options.result)
+        if Label.FOLD not in (labels := [label.decode() for label in branch.events["label"]]):
+            raise ConfigError(f"{options.result!r} has no fold (LP) to follow; its labelled points are {', '.join(labels)}")
         point = labelled_point(branch, options.point)
         found = follow(branch, point, options.against, options.between)
         names = options.against, branch.followed(branch.stage_of[point])

@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C by all commands: one line that says what is kept, exit code 130, no half-written file.
+"""Handling of Ctrl-C and SIGTERM by all commands: one line that says what is kept, exit code 130, no half-written file.
 
 A command calls `begin` before its heavy imports, so that Ctrl-C is answered from its first moments, and ends in
 ``sys.exit(interrupt.run(main))``. During the computation Ctrl-C ends the process at once: an exception inside a
@@ -34,11 +34,12 @@ class _State:
 
 
 def begin(kept: str = "") -> None:
-    """Handle Ctrl-C from now on, unless the shell ignores it; ``kept`` says what an interrupted command keeps."""
+    """Handle Ctrl-C and SIGTERM from now on, unless they are ignored; ``kept`` says what an interrupted command keeps."""
     _State.process, _State.raised = os.getpid(), False
     change(kept)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, leave)
+    for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+        if signal.getsignal(number) is usual:
+            signal.signal(number, leave)
 
 
 def at_last(function: Callable[[], object]) -> None:
@@ -92,7 +93,7 @@ def unwinding() -> Iterator[None]:
 
 
 def leave(number, frame) -> None:
-    """Handle Ctrl-C."""
+    """Handle Ctrl-C or SIGTERM."""
     if os.getpid() != _State.process:
         os._exit(EXIT_INTERRUPTED)
     if _State.held:

@@ -37,8 +37,8 @@ def primary(tmp_path_factory):
     return compute_scene(parse(PRIMARY, "scene"), Display(silent=True)).image
 
 
-def interrupted(process, module: str, delay: float) -> list[str]:
-    """Press Ctrl-C when a module is imported (Python says so on standard error); what else was written there."""
+def interrupted(process, module: str, delay: float, number=signal.SIGINT) -> list[str]:
+    """Press Ctrl-C, or send another signal, when a module is imported (Python says so on standard error); what else was written there."""
     rest = []
     for line in process.stderr:
         if not line.startswith("import time:"):
@@ -46,7 +46,7 @@ def interrupted(process, module: str, delay: float) -> list[str]:
         elif line.rpartition("|")[2].strip().startswith(module):
             break
     time.sleep(delay)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, err = process.communicate(timeout=60)
     return [*rest, *(line for line in err.splitlines() if not line.startswith("import time:"))]
 
@@ -78,13 +78,14 @@ def test_ctrl_c(command, primary, name, moment):
 
 
 @pytest.mark.posix("Windows sends Ctrl-C in another way")
-def test_ctrl_c_before_the_first_point_says_what_is_kept(command, root):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_the_first_point_is_told_what_is_kept(command, root, number):
     arguments = [str(root / "configs" / "network_hexagram.yaml"), "--out", "star.h5"]
     process = command.start(*arguments, program=("-X", "importtime", "-m", "branches.run"))
-    said = interrupted(process, "ribbon_model.network_first", 0.02)
+    said = interrupted(process, "ribbon_model.network_first", 0.02, number)
     assert process.returncode == 130
     assert said == ["interrupted; nothing new is in star.h5; the same command starts again"]
-    assert not (command.folder / "star.h5").exists()
+    assert not [*command.folder.glob("*star.h5*")]
 
 
 @pytest.fixture
@@ -92,7 +93,7 @@ def pressed(monkeypatch):
     """A function that presses Ctrl-C; ``left`` lists what would have ended the process."""
     left = []
     monkeypatch.setattr(interrupt.os, "_exit", left.append)
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     interrupt.begin("nothing")
 
@@ -102,7 +103,8 @@ def pressed(monkeypatch):
 
     press.left = left
     yield press
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def test_a_file_is_written_to_its_end(pressed, capfd):
@@ -141,7 +143,9 @@ def test_another_error_that_is_made_of_the_exception_is_no_traceback(pressed, ca
 
 
 def test_a_shell_that_ignores_ctrl_c_has_its_way():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    numbers = signal.SIGINT, signal.SIGTERM
+    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
     interrupt.begin("nothing")
-    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    signal.signal(signal.SIGINT, before)
+    assert [signal.getsignal(number) for number in numbers] == [signal.SIG_IGN] * 2
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
