@@ -84,6 +84,8 @@ def no_branch(path: Path) -> str:
         return f"it is a folder; name one of its branches, such as {found[0]}" if found else "it is a folder, without branches"
     if path.suffix in (".yaml", ".yml"):
         return f"it is a scene; compute its result first: {typed('run')} {path}"
+    if path.suffix == ".npz":
+        return f"it is a file of contin.save, which {typed('explore')} {path} shows and contin.load(...).plot() draws"
     return "it is not a readable HDF5 file"
 
 

@@ -312,7 +312,9 @@ def either_way(function: Callable[_Given, Branch]) -> Callable[_Given, Branch]:
             return function(*given, **named)
         run: Any = function
         ahead = run(*given, **{**named, "direction": 1})
-        if ahead.stop is None or ahead.stop.reason in (Reason.CLOSED, Reason.INTERRUPTED):
+        start: Any = named.get("start", given[0] if given else None)  # cycles that begin there are the same both ways
+        both_are_one = named.get("branch") == 1 and switches(start)
+        if both_are_one or ahead.stop is None or ahead.stop.reason in (Reason.CLOSED, Reason.INTERRUPTED):
             return ahead
         back, first = run(*given, **{**named, "direction": -1}), ahead.points[0]
         if first.label == Label.END:  # it is none any more
@@ -337,7 +339,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """Follow the branch through a point, or away from a branch point, to its end.
 
     Ctrl-C ends the run: the branch so far is returned. With ``direction="both"`` it is the branch both ways from the point,
-    where its arclength is 0: from the end of the way of ``direction=-1`` to that of ``direction=1``.
+    where its arclength is 0: from the end of the way of ``direction=-1`` to that of ``direction=1``. Cycles that begin at HB
+    or PD are the same both ways.
 
     Parameters
     ----------

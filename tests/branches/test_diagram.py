@@ -174,6 +174,8 @@ def test_what_is_no_diagram_is_told_with_the_command_for_it(folder, call, tmp_pa
     assert (
         "it is a scene; compute its result first: " in call(export_command, "scene.yaml", "--point", "LP", "--out", "a.stl").err
     )
+    (tmp_path / "b.npz").write_bytes(b"PK")
+    assert "explore b.npz shows and contin.load" in call(export_command, "b.npz", "--point", "LP", "--out", "a.stl").err
 
 
 def test_exports(folder):

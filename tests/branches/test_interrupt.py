@@ -38,7 +38,7 @@ def primary(tmp_path_factory):
 
 
 def interrupted(process, module: str, delay: float, number=signal.SIGINT) -> list[str]:
-    """Press Ctrl-C, or send another signal, when a module is imported (Python says so on standard error); what else was written there."""
+    """Send a signal when a module is imported (Python says so on standard error); what else was written there."""
     rest = []
     for line in process.stderr:
         if not line.startswith("import time:"):

@@ -279,3 +279,14 @@ def test_both_ways_at_once():
     assert [point.label for point in arms if point.label] == ["EP", "BP", "EP"] and sorted(arms["x"][[0, -1]]) == [-1, 1]
     circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.0})
     assert trace(solve(circle, [1.0]), free=["a"], direction="both").stop.reason == "closed"
+
+
+def test_cycles_that_begin_at_a_point_are_followed_once():
+    normal = AlgebraicProblem(
+        lambda u, p: (p.m * u.x - u.y - u.x * (u.x**2 + u.y**2), u.x + p.m * u.y - u.y * (u.x**2 + u.y**2)),
+        ["x", "y"],
+        {"m": -1},
+    )
+    (hopf,) = trace(solve(normal, [0.0, 0.0]), free=["m"], direction="both", limits={"m": (-1.2, 1)}).labelled("HB")
+    both, ahead = (trace(hopf, branch=1, direction=way, limits={"m": (-1, 1)}) for way in ("both", 1))
+    assert len(both) == len(ahead) and both[0].label == "HB" and both.stop == ahead.stop
