@@ -1,4 +1,4 @@
-"""Makes what tests compare with importable: tests/ribbon_model/conjugate_points.py."""
+"""Makes what tests compare with importable: conjugate_points.py, half_loop_energy.py and mode_matrix.py of this folder."""
 
 import sys
 from pathlib import Path

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from mode_matrix import determinant, mode_matrix
 
 from ribbon_model import exact
-from ribbon_model.dispersion import coefficients, determinant, mode_matrix, squared_frequencies
+from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON, Law, NoThreshold
 from ribbon_model.linear import convex_limits, energy_interval, index, stability_interval, thresholds
 
