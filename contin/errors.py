@@ -257,15 +257,7 @@ def refuse_unknown(function: Callable[..., Any], named: Iterable[str]) -> None:
 
 
 class Named:
-    """A class whose keywords are compared with the arguments of its constructor, as `arguments` does.
-
-    Examples
-    --------
-    >>> import contin
-    >>> contin.Newton(tol=1e-9)
-    Traceback (most recent call last):
-    contin.errors.ProblemError: there is no argument 'tol'; known are tolerance, max_iterations
-    """
+    """A class whose keywords are compared with the arguments of its constructor, as `arguments` does."""
 
     def __new__(cls, *given: object, **named: object) -> Any:
         """Compare the keywords."""

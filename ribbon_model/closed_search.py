@@ -100,7 +100,8 @@ def further(
                 continue
             place = point["kappa_star"], point["energy"]
             same_class = is_odd(Solution.of(point)) in {m % 2 == 1 for m in coverings}
-            if same_class and not is_known(place, seen) and not _is_circle(law, parameters, kappa_n, place):
+            planar = circle(law, covering(law, parameters, kappa_n, *place), kappa_n, parameters)
+            if same_class and not is_known(place, [*seen, (planar["kappa_star"], planar["energy"])]):
                 seen.append(place)
                 yield point
 
@@ -208,9 +209,3 @@ def _solved(law: Law, domain: Domain, states: np.ndarray, parameters: Mapping[st
     return solve(
         domain.problem(law), (t, states), parameters, free=domain.free[1:], intervals=_INTERVALS, degree=_DEGREE, mesh=_MESH
     )
-
-
-def _is_circle(law: Law, parameters: Mapping[str, float], kappa_n: float, place: tuple[float, float]) -> bool:
-    """Return whether kappa* and energy are those of a planar circle."""
-    found = circle(law, covering(law, parameters, kappa_n, *place), kappa_n, parameters)
-    return is_known(place, [(found["kappa_star"], found["energy"])])

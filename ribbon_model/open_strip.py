@@ -384,7 +384,9 @@ def _support(end: End, *prescribed) -> Support:
 def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
     """Return the angle along a column of these ends as it buckles, up to a factor."""
     tangent = 4.493409457909064  # the first zero of tan x = x
-    turns_start, turns_finish = (_turns_about_width(end) for end in (start, finish))
+    turns_start, turns_finish = (  # about the width
+        (end.rotation == HINGED and abs(end.axis[0]) > 1 - LOOSE) or end.rotation in (FREE, JOINT) for end in (start, finish)
+    )
     if not finish.held and finish.rotation == FREE:
         return lambda s: 1 - np.cos(math.pi * s / 2)
     if turns_start and turns_finish:
@@ -394,8 +396,3 @@ def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
     if turns_start:
         return lambda s: tangent * np.cos(tangent * s) - math.sin(tangent)
     return lambda s: np.sin(2 * math.pi * s)
-
-
-def _turns_about_width(end: End) -> bool:
-    """Return whether an end can turn about the width."""
-    return (end.rotation == HINGED and abs(end.axis[0]) > 1 - LOOSE) or end.rotation in (FREE, JOINT)

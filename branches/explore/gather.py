@@ -105,14 +105,11 @@ def _read(files: list[Path], progress: Progress) -> list[dict]:
     return [found[path] for path in files]
 
 
-def _size(texts: dict) -> int:
-    return sum(len(text) for text in texts.values() if isinstance(text, str))
-
-
 def _leave_out(families: dict[tuple, list[dict]]) -> None:
     """Remove the shapes of some families if all together would make the page too large; those that stay are spread evenly."""
     branches = [branch for one in families.values() for branch in one]
-    columns, shapes = (sum(_size(branch[name]) for branch in branches) for name in ("columns", "shapes"))
+    texts = ([text for one in branches for text in one[name].values() if type(text) is str] for name in ("columns", "shapes"))
+    columns, shapes = (sum(map(len, each)) for each in texts)
     part = min(1.0, max(_MOST_BYTES - columns, 0) / shapes)
     for number, material in enumerate(sorted(families)):
         if math.ceil((number + 1) * part) == math.ceil(number * part):

@@ -276,7 +276,8 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     parameter = first.followed(int(first.points["stage"][-1]))
     common = set.intersection(*(set(branch.points.dtype.names) for _, branch in branches))
     columns = [name for name in first.columns.shown() if name in common]
-    varying = [name for name in columns if any(_varies(branch.points[name]) for _, branch in branches)]
+    values = {name: [branch.points[name] for _, branch in branches] for name in columns}
+    varying = [name for name in columns if any(np.ptp(x) > levels.LOCATED * (1 + np.abs(x).max()) for x in values[name])]
     if parameter not in varying:
         raise StoreError(f"the results have no column in common that is followed; that of the first one is {parameter!r}")
     shown = [parameter, first.conjugate(parameter)]
@@ -302,10 +303,6 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
         "eye": (_FAR * first.view.axes[2]).tolist(),
         "families": [{"name": "stages", "parameter": parameter, "branches": stages, "circles": []}],
     }  # fmt: skip
-
-
-def _varies(values: np.ndarray) -> bool:
-    return bool(np.ptp(values) > levels.LOCATED * (1 + np.abs(values).max()))
 
 
 def _stage_shapes(branch: StoredBranch) -> dict:

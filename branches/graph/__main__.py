@@ -52,7 +52,7 @@ def _of_closed_strips(graph, options) -> Iterable[str]:
             yield f"{branch['law']}{and_nu(branch['law'], branch['nu'])}: {diagram.describe(branch['nodes'])}"
         for branch in diagram.secondaries(graph):
             if branch["family"][2:] == tuple(options.where):
-                yield f"  {diagram.describe_secondary(branch)}"
+                yield f"  {branch['mode']}, {branch['domain']}: {diagram.describe(branch['nodes'])}"
     if options.at is not None:
         yield from _states(graph, options)
     if options.folds:

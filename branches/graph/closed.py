@@ -295,11 +295,6 @@ def describe(nodes) -> str:
     return " -> ".join(map(describe_node, nodes))
 
 
-def describe_secondary(branch: dict) -> str:
-    """Return the special points of a secondary branch (see `secondaries`) in one line."""
-    return f"{branch['mode']}, {branch['domain']}: {describe(branch['nodes'])}"
-
-
 def describe_node(node) -> str:
     """Return a special point in words."""
     if node["kind"] == "circle":

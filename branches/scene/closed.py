@@ -167,13 +167,9 @@ class ClosedScene(Scene):
         from ribbon_model.strip import Strip
 
         real = Strip(**self.strip)
-        units = {
-            "energy": (real.energy_unit, "J"),
-            "M": (real.moment_unit, "N m"),
-            "R": (real.moment_unit / real.radius(1), "N"),
-        }
-        units = {name: units[name.rstrip("123")] for name in ("energy", "M1", "M2", "M3", "R1", "R2", "R3")}
-        return units | {"kappa_n": (1 / real.radius(1), "1/m"), "elastic": units["energy"], "length": (real.radius(1), "m")}
+        radius, moment, energy = real.radius(1), (real.moment_unit, "N m"), (real.energy_unit, "J")
+        found = {"kappa_n": (1 / radius, "1/m"), "length": (radius, "m"), "energy": energy, "elastic": energy}
+        return found | dict.fromkeys(("M1", "M2", "M3"), moment) | dict.fromkeys(("R1", "R2", "R3"), (moment[0] / radius, "N"))
 
     def factor(self, column: str) -> float:
         return self._units.get(column, (1.0, ""))[0]

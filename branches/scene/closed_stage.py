@@ -176,8 +176,7 @@ class ClosedStage(Stage):
         error = event["error_kappa_n"]
         certain = "" if held or math.isnan(error) else f" (± {error:.0e})"
         if scene.strip:
-            radius = 1e3 / (event["kappa_n"] * scene.factor("kappa_n") or math.inf)
-            certain += f", natural radius {radius:.6g} mm"
+            certain += f", natural radius {1e3 / (event['kappa_n'] * scene.factor('kappa_n') or math.inf):.6g} mm"
         if name == START and scene.origin:
             return f"leaves the branch ({scene.m}, {scene.n}) at {place}{certain}, {scene.origin.mode}"
         if name == START:

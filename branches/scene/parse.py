@@ -74,7 +74,7 @@ def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
         from branches.scene.open_strip import OpenScene as kind  # 0.15 s, which closed strips do not need
     try:
         values = kind.prepared(values)
-        lists = lists_in(values, kind.LISTS)
+        lists = {place: one for pattern in kind.LISTS for place, one in _at(values, pattern) if isinstance(one, list)}
         if lists or "pairs" in values and kind.PAIRS:
             return _sweep(kind, values, lists)
         return kind.model_validate(values)
@@ -153,14 +153,8 @@ def _put(values: dict, path: list[str], value: object) -> None:
     values[path[-1]] = value
 
 
-def lists_in(values: dict, places: Sequence[tuple[str, ...]]) -> dict[tuple, list]:
-    """Return the lists that stand in place of single values, by where they are in a scene; ``*`` and ``#`` match any key."""
-    found = (pair for pattern in places for pair in _at(values, pattern))
-    return {place: value for place, value in found if isinstance(value, list)}
-
-
 def _at(value: object, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
-    """Yield the places below a value that match a pattern, and what is there."""
+    """Yield the places below a value that match a pattern, in which ``*`` and ``#`` are any key, and what is there."""
     if not pattern:
         yield place, value
     elif pattern[0] == "#":
