@@ -168,7 +168,7 @@ def panel(axes, branch, columns: tuple[str, str], chosen, dots: bool = True, mea
         if words not in seen:
             axes.plot([], [], color=OTHER, ls=dashes, lw=points(1.8), label=_once(words, seen))
     if len(branch.stages) > 1:
-        for stage in stages:
+        for stage in np.intersect1d(stages, branch.stage_of).tolist():
             axes.plot([], [], color=branch.colour(stage), lw=points(1.8), label=f"stage {stage}")
     for mark in branch.marks():
         if branch.stage_of[mark.row] in stages:

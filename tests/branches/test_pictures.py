@@ -3,6 +3,7 @@
 import itertools
 import math
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -321,6 +322,14 @@ def test_a_line_says_why_it_ends():
 def test_the_legend_of_the_isotropic_rod_says_which_circle_is_stable_and_why(previews):
     words = [handle.get_label() for handle in legend(previews["isotropic rod"], "isotropic rod", 0.3)]
     assert "circle, stable (a minimum of the energy)" in words and "circle, stable to waves, but it turns inside out" in words
+
+
+def test_a_stage_that_was_not_reached_is_not_in_the_legend(stroke):
+    first = {name: (rows := getattr(stroke, name))[rows["stage"] == 1] for name in ("points", "events")}
+    kept = stroke.index[stroke.index["point"] < len(first["points"])]
+    for branch, told in ((stroke, {"stage 1", "stage 2"}), (replace(stroke, **first, index=kept), {"stage 1"})):
+        texts = {text.get_text() for text in figure(branch, 0, x="F_tangent", y="energy").findobj(Text)}
+        assert {text for text in texts if text.startswith("stage ")} == told
 
 
 def test_a_picture_for_a_column_of_a_journal(stroke):
