@@ -338,6 +338,7 @@ def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
 
 def _words(kind: Any) -> str:
     """Return what may stand where an annotation is."""
+    kind = getattr(kind, "__origin__", kind) if hasattr(kind, "__metadata__") else kind  # a number within bounds
     outer, inner = _parts(kind)
     if kind in _PLAIN:
         return _PLAIN[kind][0]

@@ -322,11 +322,6 @@ class _Inside:
         return self._factors.solve(wide)[..., : base.size]
 
 
-def _of_the_problem(name: str) -> Any:
-    """Return what the problem of a statement has under this name, as a property."""
-    return property(operator.attrgetter(f"problem.{name}"))
-
-
 @dataclasses.dataclass(frozen=True)
 class _Statement:
     """The statement behind a defining system: that of the problem, but for the number of free parameters."""
@@ -335,7 +330,9 @@ class _Statement:
     free_size: int
     columns: tuple[str, ...] = ()
 
-    states, parameters, angles, batch = map(_of_the_problem, ("states", "parameters", "angles", "batch"))
+    states, parameters, angles, batch = (  # those of the problem
+        property(operator.attrgetter(f"problem.{name}")) for name in ("states", "parameters", "angles", "batch")
+    )
 
     @property
     def functionals(self) -> Mapping[str, Function]:

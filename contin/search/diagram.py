@@ -349,6 +349,7 @@ def _check_columns(system: Discretization, settings: Settings) -> None:
     if system.starts_cycles and not system.is_cycle:
         cycles = CycleProblem.of(problem)
         known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
+    checks.chosen("scales", list(settings.scales), [*dict.fromkeys((*known, *problem.states))])
     for name in (*settings.limits, *settings.zeros):
         if name not in known:
             raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)}){meant(name, known)}")

@@ -161,6 +161,8 @@ def test_a_keyword_that_there_is_not_is_named_with_the_one_that_was_meant(calls)
     (lambda start: contin.trace(start, freee=["a"]), "no argument 'freee' (did you mean 'free'?)"),
     (lambda start: contin.trace(start, direction="booth"), "direction: 'booth' must be +1 or -1 ('both' for trace"),
     (lambda start: contin.trace(start, free=["a"], scales={"X": 1}), "scales: 'X' must be one of a, b, x (did you mean 'x'?)"),
+    (lambda start: contin.diagram(start, free=["a"], scales={"X": 1}), "scales: 'X' must be one of a, b, x"),
+    (lambda start: contin.Search([1.0], sizes="x"), "sizes: 'x' must be a list of numbers"),
     (lambda start: contin.solve(PARABOLA, [1.0], {"aa": 1.0}), "parameter 'aa' is not one of a, b (did you mean 'a'?)"),
 ])  # fmt: skip
 def test_the_sentence_names_what_was_meant(call, sentence):
