@@ -17,7 +17,7 @@ from contin.core.step import Reason, State, Stop, corrected
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.corner import changed_between
-from contin.levels import CORRECTED, DOUBLED, MOST_STEPS, ROUGH, ROUND_OFF
+from contin.levels import CORRECTED, DOUBLED, MOST_STEPS, ROUGH
 from contin.text import exact_text
 
 #: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
@@ -198,7 +198,7 @@ def limit_neared(state: State, settings: Settings, start: Discretization) -> str
     for name, size, rate in zip(system.free, system.free_scales, state.tangent[system.state_size :]):
         value = system.parameter(state.x, name)
         for limit in settings.limits.get(name, ()):
-            if 0 < abs(limit - value) < ROUND_OFF * (abs(limit) or size) and (limit - value) * rate > 0:
+            if 0 < abs(limit - value) < (abs(limit) or size) / _FAR and (limit - value) * rate > 0:
                 return f"{name} = {exact_text(limit)}"
     return ""
 
