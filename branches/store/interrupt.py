@@ -10,6 +10,7 @@ compilation or an import would print a traceback. `held` and `unwinding` change 
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -20,6 +21,9 @@ EXIT_INTERRUPTED = 130
 BRANCHES_KEPT = "finished branches are kept, and the same command computes what is missing"
 #: What is kept by commands that only print.
 NO_FILES = "this command writes no files"
+#: New objects at which garbage is collected. Python's 700 make 130 collections of what is imported: with the one at the end, a
+#: fifth of the time of a short run. Ten times more gain nothing, and keep arrays of discarded systems.
+_OBJECTS = 20_000
 
 
 class _State:
@@ -57,11 +61,14 @@ def run(main: Callable[[], int]) -> int:
 
     Compiled code of other libraries may make another error of Ctrl-C: what comes after it is the interruption.
     """
+    gc.set_threshold(_OBJECTS)
     try:
         return main()
     except (Exception, KeyboardInterrupt) as error:
         if not (_State.raised or isinstance(error, KeyboardInterrupt)):
             raise
+    finally:
+        gc.freeze()  # the process ends, and its memory with it
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
     _say()
     if os.getpid() == _State.process:  # after exec() Python would end by the signal, not with the code
