@@ -102,13 +102,18 @@ class ConnectionCollocation(Collocation):
 
     # --- the conditions at the ends ------------------------------------------------------------------------------
 
+    @property
+    def _ends_alike(self) -> bool:
+        """Whether both ends have the same coordinates."""
+        return bool(self.problem.homoclinic and not self.problem.angles)
+
     def _places(self, p: Array) -> list[Array]:
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
         n, first = self._n, list(self.problem.parameters).index(self.problem.multipliers[0])
         if not self.problem.homoclinic:
             return [p[:, place : place + n] for place in (first, first + n)]
         here = p[:, first : first + n]
-        if not self.problem.angles:
+        if self._ends_alike:
             return [here, here]
         gained, names = np.zeros((len(p), n)), list(self.problem.parameters)
         for name, period in self.problem.angles.items():
@@ -151,13 +156,13 @@ class ConnectionCollocation(Collocation):
         leaves Sylvester's equation for Y.
         """
         found: list[dict[Numbers, Array]] = []
-        numbers, same = subsets(len(directions)), classes(directions)
+        numbers, same, field = subsets(len(directions)), classes(directions), dict[Numbers, Array]()
         for end, (Q, L, solve) in enumerate(self._subspaces(p)):
             if not (len(Q) and directions):
                 found.append(dict.fromkeys(numbers, L))
                 continue
             known: dict[Numbers, Array] = {(): L}
-            field = self._jacobians_along(p, directions, end)
+            field = field if field and self._ends_alike else self._jacobians_along(p, directions, end)
             for chosen in numbers[1:]:
                 if alike(same, chosen) in known:
                     continue
@@ -182,9 +187,7 @@ class ConnectionCollocation(Collocation):
     @functools.cached_property
     def _complements(self) -> list[Array]:
         """The orthonormal N of the complements of Q."""
-        from scipy.linalg import null_space  # type: ignore[import-untyped]  # .1 s; only this needs it
-
-        return [null_space(Q) if len(Q) else np.eye(self._n) for Q in self._bases]
+        return [np.linalg.qr(Q.T, mode="complete")[0][:, len(Q) :] for Q in self._bases]
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along subsets of the directions.
@@ -240,12 +243,13 @@ class ConnectionCollocation(Collocation):
     def _by_parameters(self, x: Array, p: Array, directions: Array) -> Array:
         """Return the derivatives of projection and fold conditions along directions (m, all parameters), as columns."""
         sizes, count, found = self.scales.states, len(directions), list[Array]()
-        for (Q, L, solve), here, moves, apart in zip(
-            self._subspaces(p), self._places(p[None]), self._places(directions), self.apart(x)
-        ):
-            fields = self._jacobians_at(np.repeat(here, count, axis=0), p, [np.hstack([moves, directions])])
+        places, moves, same = self._places(p[None]), self._places(directions), self._ends_alike
+        for end, ((Q, L, solve), apart) in enumerate(zip(self._subspaces(p), self.apart(x))):
+            if not (end and same):
+                given = np.hstack([moves[end], directions])
+                fields = self._jacobians_at(np.repeat(places[end], count, axis=0), p, [given])
             turned = [solve(each) for each in L @ fields @ (np.eye(self._n) - Q.T @ L)]
-            found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves / sizes).T)
+            found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves[end] / sizes).T)
         if self.problem.saddle_node:
             found.append(np.column_stack([self._fold_along(p, [each])[0,] for each in directions]))
         return np.vstack(found)
@@ -396,7 +400,7 @@ class ConnectionCollocation(Collocation):
         B the second derivatives. Each condition is changed by that, and by an estimate of the next term, which is not known:
         the third power of the distance, over the square of the orbit's size.
         """
-        from scipy.linalg import null_space, solve_sylvester  # .1 s; only this needs it
+        from scipy.linalg import null_space, solve_sylvester  # type: ignore[import-untyped]  # .1 s; only this needs it
 
         p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
         amounts: list[float] = []
