@@ -57,7 +57,8 @@ def corrected_first(system: Discretization, x: Array, settings: Settings, primar
         system, linear = rescaled, linearization(rescaled, x, row)
     system, x, linear = _accurate(system, x, linear, settings, primary)
     unit = settings.direction * growing(system, x, linear.tangent, primary, settings.newton)
-    return _with_sign(standing_at(system, x, unit, settings.step))
+    sign = linear.sign * np.sign(inner(system, unit, linear.tangent))  # the determinant of [F_x; row] is linear in row
+    return dataclasses.replace(standing_at(system, x, unit, settings.step), sign=sign)
 
 
 def frozen(state: State) -> State:
