@@ -237,13 +237,16 @@ class Collocation(Composed):
         vars(other).pop("_thawed", None)
         return other
 
-    def on_mesh(self, mesh: Places) -> tuple[Self, Carrier]:
-        """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""
+    def on_mesh(self, mesh: Places, reference: Array | None = None) -> tuple[Self, Carrier]:
+        """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it.
+
+        With a ``reference`` on this mesh in place of its own, where it has one.
+        """
         other = self._copied()
         other._take_mesh(np.array(mesh, dtype=float))
         carry = self.carrier(other)
         if self.reference.size:
-            other._refer(carry(self.reference))
+            other._refer(carry(self.reference if reference is None else reference))
         return other, carry
 
     def refined(self) -> tuple[Self, Carrier]:
@@ -691,8 +694,7 @@ class Collocation(Composed):
             mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control, self._all_breaks(x, closely=False))
         if mesh is None and (not known.size or np.abs(x - known).max() <= APART * np.abs(x).max()):
             return None
-        renewed = self._referring_to(x) if known.size else self
-        return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
+        return (self._referring_to(x), np.array) if mesh is None else self.on_mesh(mesh, x)
 
     def on_breaks(self) -> Self:
         """Return the same problem on a mesh of as many intervals, with the breaks among its points."""
