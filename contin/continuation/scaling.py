@@ -37,7 +37,7 @@ from contin.core.system import USUAL, System, usual
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.folds import on_finer_mesh
-from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH, ROUND_OFF
+from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
@@ -144,8 +144,8 @@ class _FirstPoint:
         """Return whether all sizes are of order one, as changes of F along a random vector show: they are not looked for then.
 
         For changes of 0.01 in all unknowns, F is nearly linear. For changes of 1, each ``unknown`` that does not change along
-        the branch changes by terms that are not linear, or not at all: then no term of the expansion moves it. For a change of
-        1000 of its own, most of that is not linear in it, or there are such terms for a change of 1 of its own alone.
+        the branch changes by terms that are not linear; for a change of 1000 of its own, most of that is not linear in it, or
+        there are such terms for a change of 1 of its own alone.
         """
         largest, at_rest, along = self.system.largest, self.system.residual(self.x), self.system.largest(self.linear.tangent)
         still = unknown & (along < USUAL[0])
@@ -161,11 +161,10 @@ class _FirstPoint:
 
         here, far = missed(1.0), missed(np.where(still, USUAL[1], 1.0))
         bent = (largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)) & (largest(far) < np.inf)
-        follows, idle = largest(here) >= USUAL[0], along + largest(here) < ROUND_OFF
-        if not (follows.any() and np.all(largest(missed(USUAL[0])) <= USUAL[0]) and np.all(follows | idle | ~still)):
+        follows = largest(here) >= USUAL[0]
+        if not (follows.any() and np.all(largest(missed(USUAL[0])) <= USUAL[0]) and np.all(follows | ~still)):
             return False
-        clear = bent | idle | ~still
-        return bool(clear.all() or np.all(clear | (largest(missed(np.where(still, 1.0, 0.0))) >= USUAL[0])))
+        return bool(np.all(bent | ~still) or np.all(bent | ~still | (largest(missed(np.where(still, 1.0, 0.0))) >= USUAL[0])))
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:

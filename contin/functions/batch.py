@@ -117,9 +117,9 @@ class Recorded:
         places = {self.recording.time: time, **dict(zip(self.recording.inputs, labels))}
         return self.recording.tape.lines(self.recording.results, places)
 
-    def bends(self, inputs: tuple[int, ...] | None) -> bool:
+    def bends(self, inputs: tuple[int, ...]) -> bool:
         """Return whether derivatives by these inputs may change."""
-        return bool(self._once(("bends", inputs), lambda: self._weighted_slopes(inputs or ())))
+        return bool(self._once(("bends", inputs), lambda: self._weighted_slopes(inputs)))
 
     def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian that may differ from zero."""
