@@ -239,12 +239,14 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 
 @functools.cache
-def _keywords(function: Callable[..., Any]) -> list[str]:
-    """Return the names of the arguments of a function, with those of the TypedDict that stands behind ``**``."""
+def _keywords(function: Callable[..., Any]) -> list[str] | None:
+    """Return the names of the arguments of a function, with those of a TypedDict behind ``**``; None where these may be any."""
     found: list[str] = []
     for name, one in inspect.signature(function).parameters.items():
-        more = one.kind is one.VAR_KEYWORD
-        found += typing.get_args(typing.get_type_hints(function)[name])[0].__annotations__ if more else [name]
+        more = typing.get_args(typing.get_type_hints(function).get(name)) if one.kind is one.VAR_KEYWORD else ()
+        if one.kind is one.VAR_KEYWORD and not more:
+            return None
+        found += more[0].__annotations__ if more else [name]
     return [name for name in found if name != "self"]
 
 
@@ -252,7 +254,7 @@ def refuse_unknown(function: Callable[..., Any], named: Iterable[str]) -> None:
     """Require that keywords are arguments of a function."""
     known = _keywords(function)
     for name in named:
-        if name not in known:
+        if known is not None and name not in known:
             raise ProblemError(f"there is no argument {name!r}{meant(name, known)}; known are {listed(known)}")
 
 
