@@ -257,6 +257,11 @@ def share(basis: Basis, tolerance: float) -> float:
     return float((_BETWEEN * tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1)))
 
 
+def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) -> Array:
+    """Return a mesh of so many intervals for a solution that is given on another mesh."""
+    return _equidistributed(mesh, _raised(density(basis, mesh, states), np.diff(mesh)), intervals)
+
+
 def _raised(phi: Array, h: Array) -> Array:
     """Return the density, smoothed and not far below its mean."""
     padded = np.concatenate([phi[:1], phi, phi[-1:]])
