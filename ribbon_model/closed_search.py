@@ -191,10 +191,7 @@ class _Shooting:
         return loads
 
     def _sloped(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what is missed, and its slopes [strip, load, condition] by differences.
-
-        In one integration: of as few strips as these, most of its time goes to the number of its steps.
-        """
+        """Return what is missed, and its slopes [strip, load, condition] by differences, in one integration."""
         count = loads.shape[1]
         change = levels.APART * (1 + np.abs(loads))
         beside = loads[:, None] + change[:, :, None] * np.eye(count)

@@ -465,10 +465,7 @@ def _correct(family, z, tangent):
 
 
 def _segments(family, step):
-    """Follow the curve from the m-covered circle: yield (line, length, ahead), with line(s) the curve at 0 <= s <= length.
-
-    Ends with the first `ahead` at negative A, or nearly homoclinic.
-    """
+    """Yield (line, length, ahead) along the curve line(s) from the circle; the last ``ahead`` is homoclinic or has A < 0."""
     z = family.circle(family.m)
     tangent = _tangent(family, z)
     tangent, length = tangent * np.sign(tangent[0]), step / 10  # A grows from 0

@@ -117,10 +117,7 @@ def _root(function: Callable, a: float, b: float) -> float:
 
 @functools.lru_cache(maxsize=1000)
 def _sides(law: Law, m: int, values: tuple) -> tuple:
-    """Return places of kappa_n at which modes are looked for, below and above the natural state, and where a modulus vanishes.
-
-    The places end there; the limits are infinite where no modulus vanishes.
-    """
+    """Return places of kappa_n at which modes are looked for, below and above, and where a modulus vanishes, or infinity."""
     import numpy as np
 
     def least(kappa_n):

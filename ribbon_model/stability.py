@@ -376,10 +376,7 @@ class _Form:
 
 
 def _spectra(forms, rows, known) -> tuple[np.ndarray, float]:
-    """Return eigenvalues (K, n) of forms (K, n, n) under conditions (K, c, n), without known directions (K, n).
-
-    The number is the largest of |Q| along a direction that is known to be a zero.
-    """
+    """Return eigenvalues (K, n) of forms under conditions (K, c, n), without known zeros (K, n), and the largest |Q| there."""
     _, sizes, out = np.linalg.svd(rows, full_matrices=False)
     out = out * (sizes > levels.DEPENDENT)[:, :, None]
     known = known - (known[:, None] @ out.transpose(0, 2, 1) @ out)[:, 0]

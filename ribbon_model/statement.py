@@ -445,10 +445,7 @@ class Statement:
 
     @property
     def _free_turns(self) -> list[Vector]:
-        """Axes about which the whole network can turn without a change of the loads: all, one, or none.
-
-        A pressure belongs to the plane, in which the network stays: its tilt is held.
-        """
+        """Axes about which the network can turn with the same loads: all, one, or none. A pressure holds its plane."""
         fixed = [direction for load in self.loads.values() for _, direction, _ in load.forces]
         fixed += [self.field_direction] if "field" in self.numbers else []
         if not fixed:

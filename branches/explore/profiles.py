@@ -82,9 +82,6 @@ def marked(labels: Sequence[str], names: Sequence[str]) -> dict:
 
 
 def _sampled(times: np.ndarray, states: np.ndarray, count: int) -> np.ndarray:
-    """Return the time and the states at ``count`` of the nodes, shape (count, 1 + states); they are dense where the mesh is.
-
-    Of a cycle of a map they are those of its first point.
-    """
+    """Return times and states at ``count`` of the nodes, shape (count, 1 + states); of a map, at the first point of a cycle."""
     at, table = np.linspace(0, len(times) - 1, count), np.column_stack([times, states[: len(times)]])
     return np.array([np.interp(at, np.arange(len(times)), column) for column in table.T]).T

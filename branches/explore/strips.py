@@ -425,10 +425,7 @@ def _kept(branch: StoredBranch, number: int) -> Discretized:
 def _walk(
     branch: StoredBranch, kept: dict[int, Discretized], numbers: range, other: int
 ) -> Iterator[tuple[int, Discretized]]:  # fmt: skip
-    """Yield the points after the first of ``numbers``, which is kept, with their solutions on its mesh, until none is found.
-
-    The first step is on the secant through the solution at the point ``other``.
-    """
+    """Yield the later points of ``numbers`` with their solutions on its mesh; the first step is the secant from ``other``."""
     system, x = kept[numbers[0]]
     if len(numbers) == 1:
         return
@@ -456,10 +453,7 @@ def _fits(branch: StoredBranch, number: int, system: Collocation, x: np.ndarray)
 
 
 def _corrected(system: Collocation, last: np.ndarray, guess: np.ndarray, known: Sequence[str]) -> Iterator[np.ndarray]:
-    """Yield solutions near a guess, by Newton's method with one of the ``known`` free parameters held at that of the guess.
-
-    First it is the one that has changed most since the ``last`` solution, then the others; first in one step, then in four.
-    """
+    """Yield solutions near a guess; each holds one of the ``known`` numbers, first the one that has changed most."""
     places = np.array([system.parameter_index(name) for name in known])
     order = np.argsort(np.abs(guess[places] - last[places]) / (1 + np.abs(guess[places])))[::-1]
     for steps, held in itertools.product((1, 4), places[order]):

@@ -92,10 +92,7 @@ def _edges(branch, nodes: list[tuple[str, dict]], family: dict, file: str) -> li
 
 
 def _nodes_of_secondary(graph, family: dict, branch) -> list[tuple[str, dict]]:
-    """Return the nodes of a secondary branch; nodes that the diagram already has are reused.
-
-    Identifiers of new nodes give the origin in nine digits, or exactly if another branch has these identifiers.
-    """
+    """Return the nodes of a secondary branch, or those of the diagram; with the exact origin if nine digits are not unique."""
     origin = branch.config["origin"]
     exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
     for place in (f"{origin['kappa_n']:.9g}", exact):

@@ -154,11 +154,7 @@ def _levels(circles) -> np.ndarray:
 
 
 def _search(courses, levels, circles) -> None:
-    """Give all branches their heights: one after the other, then some of them anew as long as any cross.
-
-    Those placed anew are one that is crossed and `_AGAIN` - 1 others, in a random order (always the same); what makes more
-    crossings is undone.
-    """
+    """Place all branches one after the other, then a crossed one and `_AGAIN` - 1 random others anew as long as any cross."""
     choose, everyone = np.random.default_rng(0), sorted(range(len(courses)), key=lambda i: len(courses[i].column))
     _place(courses, everyone, levels, circles)
     crossed = _crossed_each(courses)
@@ -255,8 +251,6 @@ def _crossed(levels, pairs, rightwards) -> np.ndarray:
 
 def _straighten(courses, columns, circles) -> None:
     """Move every height towards the straight line between its neighbours, as far as the order above its column allows.
-
-    Heights above a column keep a distance, or share what room there is.
 
     At the sides of the window, where a branch may end, the circles count as branches: none leaves on top of a circle.
     """

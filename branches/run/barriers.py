@@ -108,10 +108,7 @@ def states_at(branch: OpenBranch, row: int, value: float | None = None) -> list[
 
 
 def _between(branch: OpenBranch, pair, part: float, row: int, others: dict[str, float]) -> State | None:
-    """Return the state at the numbers of a point, from two neighbouring points of the file; None if there is none nearby.
-
-    ``others`` are numbers that are not those of the point.
-    """
+    """Return the state at the numbers of a point but for ``others``, from two neighbouring kept points; None without one."""
     stage = branch.stage_at(row)
     strip = stage.strip
     kept = set(branch.kept().tolist())

@@ -233,11 +233,7 @@ class Progress(Display):
         return f"{self._done} of {self._total} {self._what} done, {so_far}{estimate}{part}"
 
     def _left(self, now: float) -> float | None:
-        """Return the estimate of the seconds left: the mean time of the parts, for each part that is left.
-
-        The mean is that of the finished parts, or of these and the current part if that is larger. The time spent on the
-        current part is taken off, but not more than the mean.
-        """
+        """Return the estimated seconds left: the mean time of a part for each one left, less what the current one has taken."""
         if not self._done:
             return None
         mean = max((self._done_at - self._began) / self._done, (now - self._began) / (self._done + 1))

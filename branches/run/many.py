@@ -138,11 +138,7 @@ def _stored_scenes(sweep: Sweep, folder: Path) -> Mapping[str, Scene]:
 
 
 def _compute_missing(sweep: Sweep, folder: Path, display: Display, run, found) -> tuple[dict[str, str], int]:
-    """Compute the missing branches, and add their parts of the graph.
-
-    Return the reasons of those that failed, by file in the order of the scene, and the number of branches that are there from
-    their other ends.
-    """
+    """Compute the missing branches and add their parts; return the reasons of failed ones by file, and the number left out."""
     kind, parts = found
     graph = new_graph("", kind.FORMAT)
     for part in parts.values():

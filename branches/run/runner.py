@@ -229,10 +229,7 @@ def _points(problem, image: bytes) -> list[Point]:
 
 @contextlib.contextmanager
 def _writing(path: Path, display: Display, resume: bool) -> Iterator[bool]:
-    """Make the folder of a result file and lock the file for this run; the value is whether there is a run to resume.
-
-    Raises StoreError where the file cannot be written, or another run is writing it.
-    """
+    """Lock a result file for a run, and yield whether there is a run to resume; raise StoreError where it cannot be written."""
     if not path.exists():
         if resume:
             display.note(f"--resume: there is no file {str(path)!r}; the run starts from the beginning")

@@ -254,10 +254,7 @@ def seed(scene: ClosedScene):
 
 
 def _leave_primary(scene: ClosedScene):
-    """Return system, first point and tangent of a secondary branch; the primary branch is followed to the origin.
-
-    Raises ConfigError where the primary branch does not pass through the origin, or no branch leaves it there.
-    """
+    """Return system, first point and tangent of a secondary branch; raise ConfigError where none leaves the primary one."""
     from ribbon_model.solution import Solution  # 10 ms, which other branches do not need
 
     try:
