@@ -87,6 +87,7 @@ def further(
     random, seen = np.random.default_rng(seed), list(known)
     for domain in HALF_LOOPS.values():
         names = domain.free[1:]
+        options = {"free": names, "intervals": _INTERVALS, "degree": _DEGREE, "mesh": _MESH}
         loads = np.concatenate([
             (1 + m) * random.standard_normal((draws, len(names)))
             + [law.circle(m, kappa_n, parameters)["M1"] if name == "M1" else 0.0 for name in names]
@@ -95,7 +96,7 @@ def further(
         for values, states in _Shooting(law, parameters, kappa_n, domain).closed(loads):
             given = {"kappa_n": kappa_n, **parameters, **dict(zip(names, map(float, values)))}
             try:
-                point = _solved(law, domain, states, given)
+                point = solve(domain.problem(law), (np.linspace(0, 1, len(states)), states), given, **options)
             except ContinError:
                 continue
             place = point["kappa_star"], point["energy"]
@@ -198,11 +199,3 @@ class _Shooting:
         every = self._missed(self.integrated(np.concatenate([loads[:, None], beside], axis=1).reshape(-1, count))[-1])
         every = every.reshape(-1, 1 + count, count)
         return every[:, 0], (every[:, 1:] - every[:, :1]) / change[:, :, None]
-
-
-def _solved(law: Law, domain: Domain, states: np.ndarray, parameters: Mapping[str, float]) -> Point:
-    """Return the solution by collocation near a strip that shooting has closed."""
-    t = np.linspace(0, 1, len(states))
-    return solve(
-        domain.problem(law), (t, states), parameters, free=domain.free[1:], intervals=_INTERVALS, degree=_DEGREE, mesh=_MESH
-    )

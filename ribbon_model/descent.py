@@ -97,10 +97,6 @@ class Descent:
         return [self.strips[int(np.argmin(np.abs(way - place)))] for place in np.linspace(0, way[-1], count)]
 
 
-def _strain_metric(strip: Strip) -> np.ndarray:
-    return np.eye(strip.size)
-
-
 def _velocity_metric(strip: Strip) -> np.ndarray:
     """Return the squares of velocity and spin at the ends of the segments, less those of the rigid motion nearest to it."""
     count, x = len(strip.strains), strip.centreline[1:]
@@ -120,7 +116,7 @@ def _velocity_metric(strip: Strip) -> np.ndarray:
 
 
 #: Metrics: function(strip) -> matrix (n, n), a multiple of the squared rate per segment.
-METRICS: dict[str, Callable[[Strip], np.ndarray]] = {"strain": _strain_metric, "velocity": _velocity_metric}
+METRICS: dict[str, Callable[[Strip], np.ndarray]] = {"strain": lambda strip: np.eye(strip.size), "velocity": _velocity_metric}
 
 
 class _Tangent:

@@ -257,6 +257,5 @@ def _fold(branch, v, tangent, ahead):
     def place(s):
         return branch.correct(v + s * (ahead - v), tangent)
 
-    return place(
-        brentq(lambda s: branch.tangent(place(s))[0] * np.sign(branch.tangent(place(s)) @ tangent), 0.0, 1.0, xtol=1e-9)
-    )
+    s = brentq(lambda s: branch.tangent(place(s))[0] * np.sign(branch.tangent(place(s)) @ tangent), 0.0, 1.0, xtol=1e-9)
+    return place(s)

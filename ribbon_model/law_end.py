@@ -39,7 +39,7 @@ NAME = "the end of the convex strain energy"
 
 
 def _least_on_lines(margin: Callable[[np.ndarray, np.ndarray], np.ndarray], t: np.ndarray, strains: np.ndarray) -> float:
-    """Return the least ``margin(t, strains)`` at nodes (K,) and on lines between them; -1 without a response."""
+    """Return the least ``margin(t, strains)`` on lines between nodes (at a jump U is concave there); -1 without a response."""
     both = np.column_stack([t, strains])
     lines = np.concatenate([both[:-1] + part * np.diff(both, axis=0) for part in np.arange(_PARTS) / _PARTS] + [both[-1:]])
     return float(margin(lines[:, 0], lines[:, 1:]).min()) if np.all(np.isfinite(lines)) else -1.0

@@ -131,7 +131,7 @@ class Network(States):
 
     def guess(self) -> list[Callable]:
         """Return the drawing as a guess, one function of s for each member."""
-        return [functools.partial(_drawn_at, member) for member in self.members.values()]
+        return [lambda s, member=member: member.drawn([s])[0] for member in self.members.values()]
 
     def padded(self, guess: Any) -> Any:
         """Return a guess of quaternion and centreline, in a form of `contin.solve`, with zeros for integral conditions."""
@@ -475,7 +475,3 @@ def _carried(state: np.ndarray, k: int) -> np.ndarray:
     if k < 3:
         return np.append(np.zeros(4), axis)
     return np.append(product((0, *axis / 2), state[:4]), np.cross(axis, state[4:7]))
-
-
-def _drawn_at(member: Member, s: float) -> np.ndarray:
-    return member.drawn([s])[0]

@@ -87,6 +87,5 @@ def phase_along(mode: Callable, state: Callable) -> Phase:
     factors = np.einsum("kt,tmi->mik", shapes, mode(t)) * np.where(waves == 0, 1, 2)
     factors[np.abs(factors) < _LEAST * np.abs(factors).max()] = 0
     level = np.einsum("mik,kt,tmi->", factors, shapes, state(t))
-    return Phase(
-        tuple((int(m), int(i), int(waves[k]), float(factors[m, i, k])) for m, i, k in np.argwhere(factors)), float(level)
-    )
+    terms = ((int(m), int(i), int(waves[k]), float(factors[m, i, k])) for m, i, k in np.argwhere(factors))
+    return Phase(tuple(terms), float(level))

@@ -34,7 +34,7 @@ from branches.store.read import read_branch, read_kind
 from contin import ConvergenceError, Newton
 from contin.lowlevel import Collocation, Label, correct, levels, point_of
 from ribbon_model import exact
-from ribbon_model.descent import METRICS, SEGMENTS, Descent, Rest, let_go, past
+from ribbon_model.descent import METRICS, SEGMENTS, Descent, let_go, past
 from ribbon_model.domains import DOMAINS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.laws import FINITE_WIDTH, LAWS, PAPER_LAWS
@@ -224,12 +224,9 @@ def way_down(branch: StoredBranch, event: np.void) -> dict | None:
         ways = [let_go(strip, metric, sign) for metric in METRICS for sign in (1, -1)]
     except (ArithmeticError, ConvergenceError, ValueError) as error:
         return {"kappa_n": kappa_n, "failed": str(error)}
-    ends = {str(rest): _end(rest) for _, rest in ways}
-    return {"kappa_n": kappa_n, "ends": list(ends.values())} | _film(ways[0][0])
-
-
-def _end(rest: Rest) -> dict:
-    return {"name": str(rest), "kind": rest.kind, "m": rest.m, "n": rest.n, "energy": rest.energy}
+    ends = {str(rest): rest for _, rest in ways}
+    told = [{"name": name, "kind": one.kind, "m": one.m, "n": one.n, "energy": one.energy} for name, one in ends.items()]
+    return {"kappa_n": kappa_n, "ends": told} | _film(ways[0][0])
 
 
 def _film(descent: Descent) -> dict:

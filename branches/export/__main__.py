@@ -156,9 +156,7 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
         found = [row for row, label in enumerate(labels) if label == text.upper()]
     if len(found) == 1:
         return int(branch.events["point"][found[0]])
-    listed = ", ".join(
-        f"{row + 1} ({label} at {branch.place(row)})" for row, label in enumerate(labels) if not found or row in found
-    )
+    listed = ", ".join(f"{row + 1} ({labels[row]} at {branch.place(row)})" for row in found or range(len(labels)))
     problem = f"{len(found)} points have this label; name one by its number" if found else "there is no such labelled point"
     raise ConfigError(f"--point {text!r}: {problem}: {listed or 'the result has none'}")
 

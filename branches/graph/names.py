@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -40,7 +42,7 @@ def name_lines(axes, named, obstacles, taken=()) -> list[str]:
     own = [_resampled(axes, x, y) for _, x, y in named]
     others = [_resampled(axes, x, y) for x, y in obstacles] + [_grid(box) for box in taken]
     frame, to_data, missing = axes.bbox.get_points(), axes.transData.inverted().transform, []
-    for place_for in (_on, _beside, _across):
+    for place_for in (_on, _beside, functools.partial(_beside, alone=_ALONE)):
         left, missing = sorted(range(len(named)), key=lambda i: len(own[i])) if place_for is _on else missing, []
         for number in left:
             text = axes.text(0, 0, named[number][0], fontsize=points(9), **_STYLE)
@@ -72,13 +74,8 @@ def _on(line, there, half, frame):
     return best, best
 
 
-def _across(line, there, half, frame):
-    """As `_beside`, with a thin line that may cross others."""
-    return _beside(line, there, half, frame, _ALONE)
-
-
 def _beside(line, there, half, frame, alone=0.0):
-    """The nearest pixel at which a name has room, and that of the line to which it belongs, where no other line is."""
+    """The nearest pixel at which a name has room, and that of its line, with no other line between unless ``alone``."""
     ends = line[_distances(line, there, np.full(2, alone or _ROOM)) >= 1]
     if not len(ends):
         return None

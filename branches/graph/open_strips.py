@@ -37,9 +37,8 @@ def part(branch: OpenBranch, file: str, numbers: dict[str, Any]) -> Part:
         names[row] = f"{file}: stage {stage}, {kind} {row}"
         columns = {name: float(event[name]) for name in ("arclength", *branch.columns.shown())}
         changes = {name: int(event[name]) for name in ("index_before", "index_after")}
-        nodes.append(
-            (names[row], {"kind": kind, "stage": stage, "breaks": event["breaks"].decode(), **changes, **own, **columns})
-        )
+        about = {"kind": kind, "stage": stage, "breaks": event["breaks"].decode()}
+        nodes.append((names[row], about | changes | own | columns))
 
     def about(piece: Piece) -> dict:
         ends, followed = [names[int(piece.rows[end])] for end in (0, -1)], branch.followed(piece.stage)

@@ -262,9 +262,8 @@ class NetworkScene(StagedScene):
 
     def told_axes(self, stage: int) -> Iterator[str]:
         """Yield what the words of directions at joints mean that a stage brings."""
-        said = {
-            f"held: {name}": (name, end.words) for name, end in (self.stages[stage - 1] if stage > 1 else self).held.items()
-        }
+        held = (self.stages[stage - 1] if stage > 1 else self).held
+        said = {f"held: {name}": (name, end.words) for name, end in held.items()}
         for name, joint in self.joints.items() if stage == 1 else ():
             used = [field for field in ("hinge", "about") if isinstance(getattr(joint, field), str)]
             said[f"joints: {name}"] = name, {field: getattr(joint, field) for field in used if field != "about" or joint.angle}

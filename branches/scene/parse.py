@@ -39,9 +39,8 @@ def load(path: str | Path, settings: Sequence[str] = ()) -> Scene | Sweep:
             data = file.read(_MOST_BYTES + 1)
         text = data.decode("utf-8")
     except FileNotFoundError as error:
-        near = meant(
-            Path(path).name, (*(one.stem for one in scenes()), *(one.name for one in Path(path).parent.glob("*.y*ml")))
-        )
+        beside = [one.name for one in Path(path).parent.glob("*.y*ml")]
+        near = meant(Path(path).name, (*(one.stem for one in scenes()), *beside))
         of_package = "'ribbon scenes' lists those of the package"
         raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}{near}; {of_package}") from error
     except OSError as error:

@@ -71,9 +71,7 @@ def _empty_file(kind: str, units: str, states: tuple[str, ...], free: tuple[str,
 def _image_of(first: Stage, tables: dict) -> bytes:
     """Return the image of the empty file of a scene."""
     free = tuple(column.name for column in first.columns().values if column.error and column.role == NUMBER)
-    named = tuple(
-        (table, tuple((name, kind, words) for name, (kind, words, _) in one.items())) for table, one in tables.items()
-    )
+    named = tuple((table, tuple((name, *told[:2]) for name, told in one.items())) for table, one in tables.items())
     return _empty_file(first.scene.KIND, first.units, tuple(first.problem.states), free, named)
 
 
