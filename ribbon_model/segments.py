@@ -289,9 +289,8 @@ class Strip(Chain):
         def slopes(strip: Strip) -> np.ndarray:
             return strip.closure_slopes[:, :, strip.free].reshape(6, -1)
 
-        return moved(
-            self, change, lambda strip: strip.closure, slopes, "the strip cannot be closed by a small change of its strains"
-        )
+        failed = "the strip cannot be closed by a small change of its strains"
+        return moved(self, change, lambda strip: strip.closure, slopes, failed)
 
     def along(self, stations) -> tuple[np.ndarray, np.ndarray]:
         """Return the directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""

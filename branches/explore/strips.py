@@ -324,10 +324,7 @@ def _stages(
 
 
 def _fixture(branch: StoredBranch, stage: int, one: Fixture, unit: float) -> dict:
-    """Return a joint, a support or a force: where it is fixed, and the profile that is turned around the first axis.
-
-    ``signs`` are those of a force at the points of the stage.
-    """
+    """Return a joint, support or force: its place, the profile around its first axis, the signs of a force at the points."""
     about = {
         "part": one.part, "last": one.last, "held": one.held, "inSpace": one.in_space, "arm": [unit * x for x in one.arm],
         "axes": one.axes.tolist(), "sides": one.turned[0], "profile": one.turned[1].tolist(),

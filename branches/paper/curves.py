@@ -129,9 +129,8 @@ def _draw(lines, secondary, last, folder: Path) -> str:
         colour = colour_of(n)
         fine = np.linspace(line[0, 0], line[-1, 0], 300)
         panels[0].plot(fine, CubicSpline(*line.T)(fine), color=colour, label=f"fold of ({m}, {n})")
-        panels[0].plot(
-            fine, [exact.bifurcation(m, n, nu) for nu in fine], color=colour, ls=":", lw=1, label=f"threshold of ({m}, {n})"
-        )
+        starts = [exact.bifurcation(m, n, nu) for nu in fine]
+        panels[0].plot(fine, starts, color=colour, ls=":", lw=1, label=f"threshold of ({m}, {n})")
         panels[0].plot(*line[0], "o", color=colour)
     panels[0].set(xlabel=r"Poisson's ratio $\nu$", ylabel=r"$\kappa_n L/2\pi$", title="folds, and where they are born (dots)")
     smooth = np.column_stack([secondary[:, 0], np.log(-secondary[:, 1])])

@@ -149,9 +149,8 @@ def _draw_laws(axes):
     for nu in NUS:
         least = _narrowest_unstable(nu)
         numbers = least * (1000 / least) ** (np.linspace(0, 1, 80) ** 3)  # the curve is steep where it begins
-        axes.plot(
-            numbers, [law_root(nu, number) for number in numbers], color=COLOURS[nu], lw=1.8, label=f"finite width, ν = {nu:g}"
-        )
+        roots = [law_root(nu, number) for number in numbers]
+        axes.plot(numbers, roots, color=COLOURS[nu], lw=1.8, label=f"finite width, ν = {nu:g}")
         axes.axhline(first_root(RIBBON, nu), color=COLOURS[nu], lw=1, ls="--", label=f"ribbon, ν = {nu:g}")
     axes.axhline(1, color="0.35", lw=1, ls=":")
     axes.text(_NARROWEST * 1.15, 1.004, "flat: rods are stable up to here and beyond", color="0.25", fontsize=9)

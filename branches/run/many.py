@@ -104,11 +104,7 @@ def run_many(
 
 
 def _kept(sweep: Sweep, folder: Path, kind: ModuleType) -> dict[str, Any]:
-    """Return the parts of the complete branches in the folder, by file.
-
-    Raises StoreError where a branch in the folder would be replaced, or would no longer be in a diagram. (A scene with the same
-    branches and further ones is accepted.)
-    """
+    """Return the parts of complete branches in the folder by file; raise StoreError if one would be replaced or left out."""
     kept = {}
     for file, scene in _stored_scenes(sweep, folder).items():
         if file not in sweep.scenes:

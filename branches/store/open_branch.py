@@ -188,9 +188,8 @@ class OpenBranch(StoredBranch):
         event = self.events[row]
         name = self.followed(int(event["stage"]))
         value = without_round_off(event[name], abs(self.points[name][self.points["stage"] == event["stage"]]).max())
-        return (
-            f"{name} = {value * self.scene.factor(name):.4f} {self.scene.unit(name)}".rstrip() + f" of stage {event['stage']}"
-        )
+        told = f"{name} = {value * self.scene.factor(name):.4f} {self.scene.unit(name)}".rstrip()
+        return f"{told} of stage {event['stage']}"
 
     def origin(self, stage: int) -> int:
         """Return the point of an earlier stage from which a stage starts."""
