@@ -150,11 +150,8 @@ def of_function(function: Callable[[Array], Array], x: Array, directions: Sequen
     >>> print(of_function(lambda x: x[:1] * x[:1] * x[1:], np.ones(2), np.eye(2)).round(6).item())
     2.0
     """
-
-    def bend(v: Array) -> Array:
-        return derivative(lambda s: function(x + s * v), len(directions), 1 / np.abs(v).max())[0]
-
-    return of_lines(bend, directions)
+    count = len(directions)
+    return of_lines(lambda v: derivative(lambda s: function(x + s * v), count, 1 / np.abs(v).max())[0], directions)
 
 
 def subsets(count: int) -> list[Numbers]:

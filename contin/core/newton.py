@@ -82,15 +82,9 @@ class Corrected:
 
 
 def correct(
-    system: Equations,
-    guess: Sequence[float] | Array,
-    row: Array | None = None,
-    target: float | Array = 0.0,
-    newton: Newton = Newton(),
-    factors: Factors | None = None,
-    sizes: Sizes | None = None,
-    linearize: bool = False,
-) -> Corrected:
+    system: Equations, guess: Sequence[float] | Array, row: Array | None = None, target: float | Array = 0.0,
+    newton: Newton = Newton(), factors: Factors | None = None, sizes: Sizes | None = None, linearize: bool = False,
+) -> Corrected:  # fmt: skip
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
     Parameters
@@ -141,15 +135,9 @@ def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
 
 
 def _in_one_call(
-    system: Any,
-    work: one_call.Workspace,
-    guess: Array,
-    row: Array | None,
-    target: float | Array,
-    newton: Newton | None,
-    linearize: bool = False,
-    near: Factorization | None = None,
-) -> Corrected | None:
+    system: Any, work: one_call.Workspace, guess: Array, row: Array | None, target: float | Array, newton: Newton | None,
+    linearize: bool = False, near: Factorization | None = None,
+) -> Corrected | None:  # fmt: skip
     """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given; the guess without newton.
 
     None where Python must decide whether updates are round-off. Raises ConvergenceError where they do not converge.
@@ -318,8 +306,7 @@ def _part_taken(system: Equations, x: Array, update: Array, factors: Factors, en
     """Return the part of a correction that makes the next one smaller; 0 where there is none."""
     part, size = 1.0, np.linalg.norm(update)
     while part >= _LEAST_PART and np.isfinite(size):
-        following = factors.solve(system.residual(x - part * update))
-        if np.linalg.norm(following) <= (1 - enough * part) * size:
+        if np.linalg.norm(factors.solve(system.residual(x - part * update))) <= (1 - enough * part) * size:
             return part
         part /= 2
     return 0.0
@@ -347,12 +334,8 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
     """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
-    (residual, factors), none = system.linearize(x, rows), np.zeros(len(rows))
-
-    def change(random: np.random.Generator) -> Array:
-        return factors.solve(np.append(system.residual(draws.rounded(random, x)) - residual, none))
-
-    return draws.spread("newton", change)
+    (residual, factors), zero = system.linearize(x, rows), np.zeros(len(rows))
+    return draws.spread("newton", lambda rng: factors.solve(np.append(system.residual(draws.rounded(rng, x)) - residual, zero)))
 
 
 def _chords(
@@ -362,9 +345,7 @@ def _chords(
     x, sizes = guess.copy(), list[float]()
     with np.errstate(all="ignore"):
         while len(sizes) < CHORDS:
-            residual = system.residual(x)
-            update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-            sizes.append(subtract(x, update))
+            sizes.append(subtract(x, _update(system, x, factors, row, target)))
             if sizes[-1] <= one_call.EXACT:
                 return Corrected(x, factors, len(sizes), sizes[-1])
             if not sizes[-1] < one_call.CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):

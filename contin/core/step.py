@@ -179,8 +179,7 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
     Raises ConvergenceError where the equations are not finite there.
     """
     if done.tangent is not None:
-        linear = Linearization(done.tangent, done.factors.sign, done.factors)
-        return Trial(system, done.x, linear, done.iterations, done.error)
+        return Trial(system, done.x, Linearization(done.tangent, done.factors.sign, done.factors), done.iterations, done.error)
     residual, factors = system.linearize(done.x, (row,))
     if not np.isfinite(residual).all():
         raise ConvergenceError("the equations are not finite at the corrected point")

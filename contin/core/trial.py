@@ -146,8 +146,7 @@ class Trial:
     def functionals(self) -> dict[str, float]:
         """The problem's functionals, computed when first asked for."""
         if self._functionals is None:
-            values = self.system.functionals(self.x)
-            self._functionals = dict(zip(self.system.problem.functionals, map(float, values)))
+            self._functionals = dict(zip(self.system.problem.functionals, map(float, self.system.functionals(self.x))))
         return self._functionals
 
     @property

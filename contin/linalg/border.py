@@ -115,12 +115,9 @@ def _units(size: int, count: int) -> Array:
 
 
 def null_vectors(
-    bordered: Callable[[Array, Array], Bordered],
-    shape: tuple[int, int],
-    borders: Borders | None = None,
-    weights: Array | float = 1.0,
-    single: Callable[[Bordered], tuple[Any, Any]] = lambda found: (found.left[0], found.right[0]),
-) -> tuple[Bordered, Borders]:
+    bordered: Callable[[Array, Array], Bordered], shape: tuple[int, int], borders: Borders | None = None,
+    weights: Array | float = 1.0, single: Callable[[Bordered], tuple[Any, Any]] = lambda found: (found.left[0], found.right[0]),
+) -> tuple[Bordered, Borders]:  # fmt: skip
     """Return the bordered matrix with borders that fit its null vectors, and these borders.
 
     - ``bordered`` (callable): ``bordered(b, c)`` returns the matrix with these borders.
@@ -144,8 +141,7 @@ def null_vectors(
 
 def rows_fit(tangents: Array, weights: Array) -> bool:
     """Return whether tangents have not turned away from orthonormal rows that have the product 1 with them."""
-    longest = np.sqrt((weights * tangents**2).sum(axis=1).max())  # 1 where each lies along its row
-    return not 1 / longest < FITS
+    return not 1 / np.sqrt((weights * tangents**2).sum(axis=1).max()) < FITS  # the root is 1 where each lies along its row
 
 
 def cosine(a: Array, b: Numbers) -> float:
