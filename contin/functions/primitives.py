@@ -146,11 +146,6 @@ def _simple_select(tape: Recorder, places: Places) -> int | None:
 # --- derivatives --------------------------------------------------------------------------------------------------------------
 
 
-def _of_pow(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any]:
-    x, y = operands
-    return y * x ** (y - 1.0), tape.apply("product", result, tape.apply("log", x))
-
-
 def _are_squares(tape: Recorder, place: int) -> bool:
     """Return whether a number is a sum of squares, by how it is computed."""
     name, operands, _ = tape.operations[place]
@@ -158,11 +153,6 @@ def _are_squares(tape: Recorder, place: int) -> bool:
         return all(_are_squares(tape, each) for each in operands)
     half = len(operands) // 2
     return name in ("mul", "dot") and operands[:half] == operands[half:]
-
-
-def _of_root(tape: Recorder, x: Any, r: Any) -> Any:
-    """Return the derivative of a root; that of a sum of squares is finite, and counts as 0 where it is 0."""
-    return 0.5 / (r + TINY / r if _are_squares(tape, x.place) else r)
 
 
 def _of_select(tape: Recorder, data: None, operands: Operands, result: object) -> tuple[Any, Any, Any]:
@@ -227,11 +217,6 @@ def _linear(data: tuple[float, ...], *operands: float) -> float:
     return _dot(None, *data, *operands)
 
 
-def _of_dot(tape: Recorder, data: None, operands: Operands, result: object) -> Operands:
-    half = len(operands) // 2
-    return (*operands[half:], *operands[:half])
-
-
 def _operation(function: Callable[..., Any], partials: Callable[..., Any], external: str = "", **more: Any) -> Primitive:
     """Return an operation of numbers, carried out where all of them are constants."""
     evaluate = _quiet(function)
@@ -291,7 +276,7 @@ TABLE: dict[str, Primitive] = {
     "neg": _ufunc(np.negative, lambda *_: (-1.0,), simplify=lambda tape, places: _negated(tape, places[0])),
     # n operands: their sum; a scalar product of two halves; a sum with constant factors
     "sum": Primitive(_sum, lambda tape, data, xs, r: (1.0,) * len(xs), constant=_sum),
-    "dot": Primitive(_dot, _of_dot, constant=_dot),
+    "dot": Primitive(_dot, lambda tape, data, xs, r: (*xs[len(xs) // 2 :], *xs[: len(xs) // 2]), constant=_dot),
     "linear": Primitive(_linear, lambda tape, data, xs, r: data, constant=_linear),
     # decisions
     "lt": _ufunc(np.less, _none),
@@ -310,7 +295,9 @@ TABLE: dict[str, Primitive] = {
     "trunc": _ufunc(np.trunc, _none),
     "rint": _ufunc(np.rint, _none),
     # functions; those with a last entry are known of complex numbers too
-    "sqrt": _ufunc(np.sqrt, _one(_of_root), pair=_root_of_pair),
+    "sqrt": _library(  # the derivative of the root of a sum of squares is finite, and counts as 0 where it is 0
+        np.sqrt, "", lambda tape, x, r: 0.5 / (r + TINY / r if _are_squares(tape, x.place) else r), _root_of_pair
+    ),
     "exp": _library(
         np.exp, "exp", lambda tape, x, r: r,
         lambda f, x, y: (f("exp", x) * f("cos", y), f("exp", x) * f("sin", y)),
@@ -357,7 +344,8 @@ TABLE: dict[str, Primitive] = {
         lambda data, x: polygamma(data, x),
         lambda tape, data, xs, r: (tape.apply("polygamma", xs[0], data=data + 1),),
     ),
-    "pow": _ufunc(np.power, _of_pow, "pow"),
+    "pow": _ufunc(np.power, lambda tape, data, xs, r: (
+        xs[1] * xs[0] ** (xs[1] - 1.0), tape.apply("product", r, tape.apply("log", xs[0]))), "pow"),
     "atan2": _ufunc(np.arctan2, lambda tape, data, xs, r: _of_angle(*xs), "atan2"),
     "hypot": _ufunc(np.hypot, lambda tape, data, xs, r: (xs[0] / (r + TINY), xs[1] / (r + TINY)), "hypot"),
     "mod": _ufunc(np.mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "fmod"),

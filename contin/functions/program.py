@@ -99,11 +99,9 @@ class _Lowering:
         self.unknowns = 0
         places = [place for place, _ in results]
         self.needed = tape.needed(places)
-        self.varies = tape.reading(places, [place for place in self.needed if self._varies(tape.operations[place])])
+        given = [(place, *tape.operations[place]) for place in self.needed]
+        self.varies = tape.reading(places, [at for at, name, _, slot in given if name == "input" and slot not in inputs.p])
         self._number_scalars()
-
-    def _varies(self, operation: Operation) -> bool:
-        return operation.name == "input" and operation.data not in self.inputs.p
 
     def _number_scalars(self) -> None:
         """Give a scalar to every constant and parameter."""
@@ -353,8 +351,7 @@ class _Stretch:
         depends = shared.tape.reading(results, search.unknowns)
         inner = [each for each in shared.tape.needed(results) if depends[each] and each not in search.unknowns]
         unknowns = {unknown: at + number for number, unknown in enumerate(search.unknowns)}
-        varying = {operand: register for operand, register in registers.items() if operand not in self.scalar}
-        given = {**varying, **unknowns}
+        given = {operand: register for operand, register in registers.items() if operand not in self.scalar} | unknowns
         sub = _Stretch(shared, inner, moves, given, self.most)
         for result, targets in moves.items():
             for _, target in targets if not depends[result] or result in unknowns else ():

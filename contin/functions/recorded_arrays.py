@@ -346,10 +346,6 @@ def _where(condition: object, *sides: object) -> Any:
     return elementwise(select, condition, *sides)
 
 
-def _select(conditions: Sequence[object], choices: Sequence[object], default: object = 0.0) -> Any:
-    return functools.reduce(lambda other, pair: _where(*pair, other), reversed([*zip(conditions, choices)]), default)
-
-
 def _norm(x: object, ord: object = None, axis: object = None, keepdims: bool = False) -> Any:  # noqa: A002  NumPy's name
     values = _plain(x)
     if axis is not None or keepdims or (ord not in (None, 2) or (ord == 2 and values.ndim != 1)):
@@ -448,7 +444,9 @@ def _like(value: float) -> Callable[..., Any]:
 #: Functions of NumPy that are not universal, and are written for recorded numbers here.
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where, np.linalg.norm: _norm, np.linalg.det: _determinant, np.linalg.inv: _inverse, np.linalg.solve: _solved,
-    np.interp: _interp, np.select: _select, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
+    np.select: lambda conditions, choices, default=0.0: functools.reduce(
+        lambda other, pair: _where(*pair, other), reversed([*zip(conditions, choices)]), default),
+    np.interp: _interp, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
     np.vdot: lambda a, b: scalar_product(_plain(_parts("conjugate")(a)).ravel().tolist(), _plain(b).ravel().tolist()),
     np.inner: matrix_product, np.polyval: _polyval, np.zeros_like: _like(0.0), np.ones_like: _like(1.0),
     np.empty_like: _like(0.0), np.full_like: _like(0.0),

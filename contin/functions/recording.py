@@ -312,8 +312,7 @@ def _compare(function: UserFunction, signature: Signature, recording: Recording,
         values: dict[Any, float] = {TIME: time, **dict(enumerate(inputs))}
         computed = np.array(recording.tape.evaluate(places, values))
         known = np.isfinite(expected)
-        scale = 1 + np.abs(expected[known]).max(initial=0.0)
-        if np.any(np.abs(computed[known] - expected[known]) > LOCATED * scale):
+        if np.any(np.abs(computed[known] - expected[known]) > LOCATED * (1 + np.abs(expected[known]).max(initial=0.0))):
             raise Unrecordable("its values are not those of its recording")
 
 

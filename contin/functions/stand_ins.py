@@ -396,26 +396,15 @@ def _of_complex(name: str) -> Callable[[Any], Any]:
     return lambda z: function_of_complex(name, complex_number(z.tape, z))
 
 
-def _distance(p: Sequence[Any], q: Sequence[Any]) -> Any:
-    difference = [a - b for a, b in zip(p, q)]
-    return operation("sqrt")(scalar_product(difference, difference))
-
-
-def _log(x: object, base: object = math.e) -> Any:
-    return operation("log")(x) if base == math.e else operation("log")(x) / operation("log")(base)
-
-
-def _hypot(*values: object) -> Any:
-    return operation("hypot")(*values) if len(values) == 2 else operation("sqrt")(scalar_product(values, values))
-
-
 #: Functions of recorded numbers by the functions that they stand for: operations under their own names, and others.
 _OF_NUMBERS: dict[Any, Callable[..., Any]] = {getattr(math, name): operation(name) for name in TABLE if hasattr(math, name)}
 _OF_NUMBERS |= {
-    math.log: _log, math.hypot: _hypot, math.pow: UFUNCS["power"], math.fabs: abs,
+    math.log: lambda x, base=math.e: operation("log")(x) if base == math.e else operation("log")(x) / operation("log")(base),
+    math.hypot: lambda *xs: operation("hypot")(*xs) if len(xs) == 2 else operation("sqrt")(scalar_product(xs, xs)),
+    math.dist: lambda p, q: FUNCTIONS[np.linalg.norm]([a - b for a, b in zip(p, q)]), math.pow: UFUNCS["power"], math.fabs: abs,
     math.copysign: lambda x, y: abs(x) * operation("sign")(operation("sign")(y) + 0.5),
     math.radians: UFUNCS["radians"], math.degrees: UFUNCS["degrees"], math.ldexp: lambda x, n: x * 2.0**n,
-    math.isfinite: UFUNCS["isfinite"], math.isnan: UFUNCS["isnan"], math.dist: _distance,
+    math.isfinite: UFUNCS["isfinite"], math.isnan: UFUNCS["isnan"],
     math.fmod: lambda x, y: x - y * operation("trunc")(x / y), cmath.phase: FUNCTIONS[np.angle],
     cmath.rect: lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi)),
 }  # fmt: skip
