@@ -191,19 +191,16 @@ def _ends(side: int) -> Event:
 
 
 def _double(side: int) -> Event:
-    def square(trial: Trial) -> float:
-        first, second = _leading(trial, side)[:2]
-        return float(((first - second) ** 2).real)
-
-    return Event("DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue", square)
+    return Event(
+        "DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue",
+        lambda trial: float((np.subtract(*_leading(trial, side)[:2]) ** 2).real),
+    )  # fmt: skip
 
 
 def _divergent(side: int) -> Event:
-    def total(trial: Trial) -> float:
-        return _total(2 * _leading(trial, side)[0].real, _leading(trial, 1 - side)[0].real)
-
     return Event(
-        "NDU" if side else "NDS", "neutrally divergent saddle-focus", total,
+        "NDU" if side else "NDS", "neutrally divergent saddle-focus",
+        lambda trial: _total(2 * _leading(trial, side)[0].real, _leading(trial, 1 - side)[0].real),
         confirm=lambda trial: _is_complex(_leading(trial, side)[0]),
     )  # fmt: skip
 
@@ -211,10 +208,7 @@ def _divergent(side: int) -> Event:
 def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) -> Event:
     """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
 
-    def value(trial: Trial) -> float:
-        return float("nan") if _is_complex(_leading(trial, side)[0]) else function(trial)
-
-    return Event(label, name, value)
+    return Event(label, name, lambda trial: np.nan if _is_complex(_leading(trial, side)[0]) else function(trial))
 
 
 def _component(unit: Array, vector: Array) -> float:

@@ -91,7 +91,8 @@ class ConnectionCollocation(Collocation):
         self.reference = x.copy()
         self._phase = self.phase_row(self._scaled_states(x))
         self._target = float(self._phase @ x)
-        self._bases = tuple(_orthonormal(left) for left in self._left_vectors(self.all_parameters(x)))
+        left_vectors = self._left_vectors(self.all_parameters(x))  # the closest orthonormal bases of the same spaces
+        self._bases = tuple(u @ v for u, _, v in (np.linalg.svd(left, full_matrices=False) for left in left_vectors))
         left, _, right = np.linalg.svd(self.saddle_jacobian(x))
         self._borders = left[:, -1], right[-1]
 
@@ -246,8 +247,7 @@ class ConnectionCollocation(Collocation):
         places, moves, same = self._places(p[None]), self._places(directions), self._ends_alike
         for end, ((Q, L, solve), apart) in enumerate(zip(self._subspaces(p), self.apart(x))):
             if not (end and same):
-                given = np.hstack([moves[end], directions])
-                fields = self._jacobians_at(np.repeat(places[end], count, axis=0), p, [given])
+                fields = self._jacobians_at(np.repeat(places[end], count, axis=0), p, [np.hstack([moves[end], directions])])
             turned = [solve(each) for each in L @ fields @ (np.eye(self._n) - Q.T @ L)]
             found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves[end] / sizes).T)
         if self.problem.saddle_node:
@@ -363,9 +363,8 @@ class ConnectionCollocation(Collocation):
 
     def _left_null_vector(self, x: Array, factors: Factors | None) -> Array:
         """Return it from solutions of F_x^T y + rows^T m = e for the user's parameters, combined so that no row is left."""
-        rows = self.size - self.equations
         if factors is None:
-            _, factors = self.linearize(x, generator("null").standard_normal((rows, self.size)))
+            _, factors = self.linearize(x, generator("null").standard_normal((self.size - self.equations, self.size)))
         own = [name for name in self.free if name not in self.problem.multipliers]
         units = np.zeros((len(own), self.size))
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
@@ -382,8 +381,7 @@ class ConnectionCollocation(Collocation):
         p and q are the left and right eigenvectors of the eigenvalue zero.
         """
         values, (b, c) = self.all_parameters(x), self._borders
-        jacobian = self.saddle_jacobian(x)
-        bordered = np.block([[jacobian, b[:, None]], [c[None], np.zeros((1, 1))]])
+        bordered = np.block([[self.saddle_jacobian(x), b[:, None]], [c[None], np.zeros((1, 1))]])
         unit = np.append(np.zeros(self._n), 1.0)
         q, p = (np.linalg.solve(matrix, unit)[:-1] for matrix in (bordered, bordered.T))
         q /= np.linalg.norm(q)
@@ -560,9 +558,3 @@ def _normalized(left: Array, basis: Array) -> Array:
         return np.asarray(np.linalg.solve(left @ basis.T, left), dtype=float)
     except np.linalg.LinAlgError:
         raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step") from None
-
-
-def _orthonormal(left: Array) -> Array:
-    """Return the orthonormal basis of the same space that is closest to a basis."""
-    u, _, v = np.linalg.svd(left, full_matrices=False)
-    return u @ v

@@ -129,8 +129,7 @@ class ConnectionProblem(BoundaryValueProblem):
     @property
     def multipliers(self) -> tuple[str, ...]:
         """Names of the parameters that are free on every curve: the coordinates of the equilibria."""
-        kinds = ("from_",) if self.homoclinic else ("from_", "to_")
-        return tuple(kind + name for kind in kinds for name in self.state_names)
+        return tuple(kind + name for kind in ("from_", "to_")[: 2 - self.homoclinic] for name in self.state_names)
 
     @property
     def ends(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -351,15 +351,11 @@ class Algebraic(Spectral, Composed):
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
     def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
-        """Return the eigenvalues at places.
-
-        This is the notion of stability of the kind of problem: whatever asks for eigenvalues asks this.
-        """
+        """Return the eigenvalues at places."""
         if self.is_sparse:
             return [Eigenvalues(rightmost(self.as_field().field_jacobian(x), self.problem.solver)) for x in places]
         matrices = np.array([self.jacobian(x) for x in places])
-        finite = np.isfinite(matrices).all()
-        found = eigenvalues(matrices) if finite else np.array([eigenvalues(matrix) for matrix in matrices])
+        found = eigenvalues(matrices) if np.isfinite(matrices).all() else np.array([*map(eigenvalues, matrices)])
         near: Any = may_be_on_axis(found).any(axis=-1)
         settled = [functools.partial(off_axis, eigenvalues, *both) for both in zip(matrices, found)]
         return [Eigenvalues(values, again if doubtful else None) for values, again, doubtful in zip(found, settled, near)]

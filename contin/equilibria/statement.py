@@ -125,8 +125,7 @@ class AlgebraicProblem(Restated):
         mass = Mass.of(self.mass, self.state_names)
         field = returning(self.residual, self._signature)
         if mass.is_regular:
-            arrays = self._signature.fills(self.residual)
-            jacobian = self.jacobian and mass.jacobian_of(self.jacobian, arrays)
+            jacobian = self.jacobian and mass.jacobian_of(self.jacobian, self._signature.fills(self.residual))
             self._keep(residual=mass.rates_of(field, 2), jacobian=jacobian, count=None, mass=None)
         else:
             self._keep(residual=field, jacobian=None, count=None, mass=mass)
