@@ -272,8 +272,7 @@ def fields(record: object) -> None:
     hints, _ = _annotations(cast(Any, type(record)))
     defaults = vars(type(record))
     for name, value in vars(record).items():
-        given = name not in defaults or value is not defaults[name]
-        if given and (said := _refusal(name, value, hints.get(name, Any))):
+        if (name not in defaults or value is not defaults[name]) and (said := _refusal(name, value, hints.get(name, Any))):
             raise ProblemError(said)
 
 
@@ -291,8 +290,7 @@ _PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     bool: ("True or False", lambda value: isinstance(value, (bool, np.bool_))),
     str: ("a name", lambda value: isinstance(value, str)),
     Path: ("a path", lambda value: isinstance(value, os.PathLike)),
-    Any: ("anything", lambda value: True),
-    object: ("anything", lambda value: True),
+    **dict.fromkeys((Any, object), ("anything", lambda value: True)),
 }
 
 

@@ -45,8 +45,7 @@ def value_names(values: Iterable[float]) -> dict[float, str]:
     """
     names = {}
     for value in values:
-        typed = float(f"{value:.{_TYPED}g}") == value
-        names[value] = exact_text(value) if typed else f"{value:.{_FEWEST}g}"
+        names[value] = exact_text(value) if float(f"{value:.{_TYPED}g}") == value else f"{value:.{_FEWEST}g}"
     count = Counter(names.values())
     return {value: name if count[name] == 1 else exact_text(value) for value, name in names.items()}
 

@@ -121,8 +121,7 @@ class Restated(checks.Named):
     def __new__(cls, *arguments: object, **options: object) -> Any:
         """Note the arguments."""
         made = super().__new__(cls, *arguments, **options)
-        names = list(inspect.signature(cls.__init__).parameters)[1:]
-        made._keep(_stated={**dict(zip(names, arguments)), **options})
+        made._keep(_stated={**dict(zip([*inspect.signature(cls.__init__).parameters][1:], arguments)), **options})
         return made
 
     def _signatures(self) -> Mapping[str, Arguments]:
@@ -143,8 +142,7 @@ class Restated(checks.Named):
 
     def _groups(self: Any) -> list[str]:
         """Return the names of the groups of functions."""
-        functionals = ["functionals"] if self.functionals else []
-        return ["residual", *functionals]
+        return ["residual"] + ["functionals"] * bool(self.functionals)
 
     def __reduce__(self) -> Any:
         signatures = self._signatures()
@@ -173,10 +171,10 @@ def _restated(kind: type, stated: dict[str, Any]) -> Any:
 
 def portable(value: object, arguments: Arguments | None) -> Any:
     """Return a value with recordings in the place of functions that no other process finds by their names."""
-    return _carried(value, arguments, _importable)
+    return _carried(value, arguments, is_importable)
 
 
-def _importable(function: object) -> bool:
+def is_importable(function: object) -> bool:
     """Return whether another process finds a function by its name."""
     try:
         pickle.dumps(function)

@@ -320,8 +320,7 @@ class Diagram:
             for i, branch in enumerate(self.branches)
         ]
         drawn = plot.picture(lambda axes: self.plot(axes=axes)) if any(len(branch) for branch in self.branches) else ""
-        table = html_table(("branch", "points", "labels", "end"), rows)
-        return f"<div>{head}{drawn}{table}{_paragraphs(self._told())}</div>"
+        return f"<div>{head}{drawn}{html_table(('branch', 'points', 'labels', 'end'), rows)}{_paragraphs(self._told())}</div>"
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.
@@ -397,8 +396,7 @@ def _paragraphs(notes: Sequence[str]) -> str:
 
 def _labels(points: Sequence[Point]) -> str:
     """Return how many labelled points of each kind there are, as text."""
-    counts = Counter(point.label for point in points if point.label)
-    return ", ".join(f"{count} {label}" for label, count in counts.items())
+    return ", ".join(f"{count} {label}" for label, count in Counter(each.label for each in points if each.label).items())
 
 
 def _of_labelled(points: Sequence[Point]) -> str:

@@ -55,32 +55,19 @@ PALETTE = (
 
 #: Labelled points: matplotlib's symbol, colour, and the words of the legend.
 _MARKS = {
-    "EP": (".", Colour.BLACK, "end"),
-    "LP": ("*", Colour.VERMILION, "fold"),
-    "BC": ("v", Colour.VERMILION, "corner"),
-    "GR": ("v", Colour.PURPLE, "grazing"),
-    "SL": ("v", Colour.GREEN, "sliding"),
-    "BP": ("o", Colour.BLACK, "branch point"),
-    "HB": ("s", Colour.GREEN, "Hopf point"),
-    "UZ": ("D", Colour.PURPLE, "given value"),
-    "EX": ("s", Colour.VERMILION, "extremum"),
-    "PD": ("X", Colour.BLUE, "period doubling"),
-    "TR": ("h", Colour.SKY, "torus bifurcation"),
-    "MX": ("x", Colour.BLACK, "Newton's method failed"),
-    "CP": ("^", Colour.VERMILION, "cusp"),
-    "BT": ("v", Colour.BLACK, "Bogdanov-Takens point"),
-    "ZH": ("<", Colour.ORANGE, "zero-Hopf point"),
-    "HH": (">", Colour.SKY, "double Hopf point"),
-    "GH": ("P", Colour.GREEN, "generalized Hopf point"),
-    "GPD": ("P", Colour.BLUE, "generalized period doubling"),
-    "CH": ("P", Colour.SKY, "Chenciner point"),
-    "LPPD": ("d", Colour.VERMILION, "fold-flip point"),
-    "LPTR": ("d", Colour.SKY, "fold-torus point"),
-    "R1": ("p", Colour.ORANGE, "resonance 1:1"),
-    "R2": ("p", Colour.PURPLE, "resonance 1:2"),
-    "R3": ("p", Colour.BLUE, "resonance 1:3"),
+    "EP": (".", Colour.BLACK, "end"), "LP": ("*", Colour.VERMILION, "fold"), "BC": ("v", Colour.VERMILION, "corner"),
+    "GR": ("v", Colour.PURPLE, "grazing"), "SL": ("v", Colour.GREEN, "sliding"), "BP": ("o", Colour.BLACK, "branch point"),
+    "HB": ("s", Colour.GREEN, "Hopf point"), "UZ": ("D", Colour.PURPLE, "given value"),
+    "EX": ("s", Colour.VERMILION, "extremum"), "PD": ("X", Colour.BLUE, "period doubling"),
+    "TR": ("h", Colour.SKY, "torus bifurcation"), "MX": ("x", Colour.BLACK, "Newton's method failed"),
+    "CP": ("^", Colour.VERMILION, "cusp"), "BT": ("v", Colour.BLACK, "Bogdanov-Takens point"),
+    "ZH": ("<", Colour.ORANGE, "zero-Hopf point"), "HH": (">", Colour.SKY, "double Hopf point"),
+    "GH": ("P", Colour.GREEN, "generalized Hopf point"), "GPD": ("P", Colour.BLUE, "generalized period doubling"),
+    "CH": ("P", Colour.SKY, "Chenciner point"), "LPPD": ("d", Colour.VERMILION, "fold-flip point"),
+    "LPTR": ("d", Colour.SKY, "fold-torus point"), "R1": ("p", Colour.ORANGE, "resonance 1:1"),
+    "R2": ("p", Colour.PURPLE, "resonance 1:2"), "R3": ("p", Colour.BLUE, "resonance 1:3"),
     "R4": ("p", Colour.GREEN, "resonance 1:4"),
-}
+}  # fmt: skip
 _OTHER = (".", Colour.BLACK, "")
 
 

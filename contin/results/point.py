@@ -111,8 +111,7 @@ class Point(Record):
         states = self.system.named_states
         if name in states:
             return float(self.system.states(self.x)[0, states.index(name)])
-        functions = () if states else tuple(self.system.problem.states)
-        if name in functions:
+        if not states and name in self.system.problem.states:
             raise KeyError(f"{name!r} is a function of t: take point.system.evaluate(point.x, t), or state a functional of it")
         known = (*self.parameters, *self.functionals, *states)
         raise KeyError(f"{name!r} is none of {checks.listed(known)}{meant(name, known)}")

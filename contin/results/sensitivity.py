@@ -108,8 +108,7 @@ def _slope_of(point: Record, name: str, held: str | Callable[[Trial], float], v:
     value, linear = system.parameter(point.x, name), Linearization(point.tangent, np.nan)
 
     def measured(s: float) -> float:
-        there = system.with_parameters({name: value + s * change}) if change else system
-        trial = Trial(there, point.x + s * v, linear)
+        trial = Trial(system.with_parameters({name: value + s * change}) if change else system, point.x + s * v, linear)
         return held(trial) if callable(held) else trial[held]
 
     return float(derivative(measured)[0])

@@ -261,8 +261,7 @@ def _head(stored: dict[str, Any]) -> dict[str, Any]:
         return stored
     if stored["format"] != _OF_VERSION_2:
         raise KeyError("format")
-    untold = {"value": None, "discretization_error": math.nan, "column": ""}
-    rows = [{**untold, **row} for row in stored["points"]]
+    rows = [{"value": None, "discretization_error": math.nan, "column": "", **row} for row in stored["points"]]
     for row in rows:
         if row["name"] in (*stored["names"], *row["functionals"]):
             row["column"] = row["name"]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -367,8 +367,7 @@ def _of_orbit(system: System, x: Array, rank: _Rank | None) -> str:
         system.check_solution(z)  # an equilibrium solves the equations of cycles with any period
     except ConvergenceError:
         return ""
-    names = [name for name in system.problem.parameters if name not in system.free]
-    breaking = _acting(system, z, rank.left[rank.null], names)
+    breaking = _acting(system, z, rank.left[rank.null])
     which = f'free "{breaking[0]}", which breaks it,' if breaking else "free a parameter that breaks it, as a damping does,"
     return (
         "free: the orbit is one of a family at the same parameters, as where a quantity is conserved: "
@@ -376,9 +375,9 @@ def _of_orbit(system: System, x: Array, rank: _Rank | None) -> str:
     )
 
 
-def _acting(system: System, x: Array, left: Array, names: Sequence[str]) -> list[str]:
-    """Return which parameters enter combinations ``left`` (k, equations) of the equations."""
-    if not names:
+def _acting(system: System, x: Array, left: Array) -> list[str]:
+    """Return which parameters that are not free enter combinations ``left`` (k, equations) of the equations."""
+    if not (names := [name for name in system.problem.parameters if name not in system.free]):
         return []
     columns = system.parameter_columns(x, names)
     acting = np.any(np.abs(left @ columns) > LOCATED * (np.abs(left) @ np.abs(columns)), axis=0).tolist()
@@ -417,8 +416,7 @@ def _conditions(system: System, z: Array, rank: _Rank, solved: bool) -> str:
     free_ones = f"{text} {'is' if is_one else 'are'} not determined"
     if solved:
         return f"boundary: {extra} follow{verb} from the others and the equations, and {free_ones}: put {held} in {their} place"
-    others = [name for name in problem.parameters if name not in system.free]
-    freed = _acting(system, z, left, others)[: len(ends)]
+    freed = _acting(system, z, left)[: len(ends)]
     advice = f", or add it and free {checks.listed(freed)}" if len(freed) == len(ends) == 1 else ""
     return (
         f"boundary: {extra} contradict{verb} the others and the equations, so there is no solution at these parameters, and "

@@ -331,8 +331,7 @@ def _numbers(values: object, count: int | None = None) -> Array:
 
 def _mesh_of(system: Collocation, order: int) -> Array:
     """Return the mesh of a guess for a problem with a symmetry of this order, on the part that is computed."""
-    parts = system.order
-    if parts == order:
+    if system.order == order:
         return system.mesh
-    whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts
+    whole = np.unique(np.arange(system.order)[:, None] + system.mesh) * order / system.order
     return np.append(whole[whole < 1 - ROUGH], 1.0)

@@ -17,6 +17,7 @@ from contin import errors as checks
 from contin.boundary.statement import BoundaryValueProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ContinError, ProblemError
+from contin.problems.statement import is_importable
 from contin.text import shown
 from contin.threads import MOST
 
@@ -124,11 +125,8 @@ def _in_processes(function: Callable[..., Any], problem: object, jobs: Sequence[
     from concurrent.futures import ProcessPoolExecutor  # 20 ms; only this needs it
 
     forks = sys.platform.startswith("linux")  # they have all that is compiled and recorded; elsewhere they are not safe
-    if not forks:
-        try:
-            pickle.dumps(function)
-        except Exception:  # whatever pickling it raises
-            raise ProblemError("function: must be one that other processes can import, or workers 1") from None
+    if not (forks or is_importable(function)):
+        raise ProblemError("function: must be one that other processes can import, or workers 1")
     context = multiprocessing.get_context("fork" if forks else "spawn")
     with ProcessPoolExecutor(min(workers, len(jobs)), context, _begin, (function, problem)) as pool:
         return list(_gathered([(pool.submit(_here, job), job) for job in jobs]))

@@ -360,8 +360,7 @@ def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, N
     states, names = system.states(cycle.x), system.problem.state_names
     rest, unstable = _saddle(system, cycle.x)
     angles, periods = system.problem.angles, periods_of(system.problem)
-    own = (PERIOD, *winding_names(angles))
-    parameters = {name: value for name, value in cycle.parameters.items() if name not in own}
+    parameters = {name: value for name, value in cycle.parameters.items() if name not in (PERIOD, *winding_names(angles))}
     problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable, angles=angles)
     degree = system.degree
     apart = states[::degree] - rest

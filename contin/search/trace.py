@@ -171,12 +171,7 @@ def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
     """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
     twice, x = system.doubled(x)
     found = locate_branch_point(twice, x)
-
-    def change(tangent: Array) -> float:
-        first, second = np.split(twice.states(tangent), 2)
-        return float(np.abs(second - first).max())
-
-    return twice, found.x, max(found.tangents, key=change)
+    return twice, found.x, max(found.tangents, key=lambda v: float(np.abs(np.subtract(*np.split(twice.states(v), 2))).max()))
 
 
 def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
@@ -185,12 +180,8 @@ def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) ->
     The states of the other one may be round-off, as where the cycles do not depend on the parameter: no share of them tells.
     """
     half = twice.nodes.size // 2
-
-    def change(tangent: Array) -> float:
-        states = twice.states(tangent)
-        return float(np.abs(states[: half + 1] @ turn.T - states[half:]).max())
-
-    return max(found.tangents, key=change)
+    rounds = [(states[: half + 1] @ turn.T, states[half:]) for states in map(twice.states, found.tangents)]
+    return found.tangents[int(np.argmax([np.abs(first - second).max() for first, second in rounds]))]
 
 
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:
@@ -206,8 +197,7 @@ def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]
         raise ProblemError("start: must be a point of a curve of homoclinic orbits in two parameters")
     to_saddle, side = crossing(point)
     unstable = old.unstable - side if to_saddle else old.unstable + side
-    values = dict(point.parameters)
-    own = (*old.multipliers, TIME, *winding_names(old.angles))
+    values, own = dict(point.parameters), (*old.multipliers, TIME, *winding_names(old.angles))
     given = {name: value for name, value in values.items() if name not in own}
     problem = ConnectionProblem(old.field, old.state_names, given, unstable=unstable, angles=old.angles, saddle_node=to_saddle)
     other = ConnectionCollocation(problem, system.mesh, system.degree, system.free, values, system.scales)
@@ -284,8 +274,7 @@ def oscillation(point: Point, times: int = TIMES) -> tuple[Point, Array]:
         return system.evaluate(system.pack(states, dict.fromkeys(system.free, 0.0)), found.nodes)
 
     first = found.pack(np.tile(carried(system.states(x)), (1, times)), values)
-    wave = carried(vector.real) + 1j * carried(vector.imag)
-    tangent = found.pack(turned(wave, times), dict.fromkeys(found.free, 0.0))
+    tangent = found.pack(turned(carried(vector.real) + 1j * carried(vector.imag), times), dict.fromkeys(found.free, 0.0))
     return point_of(found, first), tangent / np.abs(tangent).max()
 
 
@@ -475,8 +464,7 @@ def _own_tangent(start: Point, system: Discretization, settings: Settings) -> Ar
     if not known.leaving or system is not start.system:
         return None  # elsewhere the equations tell it
     tangent: Array = known.leaving[0]
-    rate = tangent[system.parameter_index(settings.primary or system.free[0])]
-    return settings.direction * oriented_along(tangent, rate)
+    return settings.direction * oriented_along(tangent, tangent[system.parameter_index(settings.primary or system.free[0])])
 
 
 def _tangent(start: Point, system: Discretization, branch: int) -> Array:
