@@ -7,7 +7,7 @@ before and behind it, and u the states at the mesh point, it happens later by
 
 and the interval behind begins with other states, to first order in the delay:
 
-    u+ = u + (f- - f+) delay,   du+/du = 1 + (f+ - f-) g_u / g'   (the saltation matrix).
+    u+ = u + (f- - f+) delay,   du+/du = 1 + (f+ - f-) g_u / g'   (the saltation matrix, where the delay is zero).
 
 Mesh points are moved by the delays until these are round-off. So no polynomial crosses a jump, and derivatives by states and
 parameters, tangents and multipliers are those of the solution with its jumps.
@@ -24,13 +24,16 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.collocation.corners import Switching
 from contin.collocation.mesh import interpolation
-from contin.errors import Grazing
+from contin.errors import ConvergenceError, Grazing
 from contin.functions.batch import Batch, Piecewise
 from contin.functions.origin import source
 from contin.levels import CORRECTED
 
 #: Largest part of its length that a piece between crossings loses in a step of Newton's method.
 _SHRINKS = 0.8
+#: Largest growth of such a piece in a step, as a multiple: behind a grazing point the square of its length grows evenly, and 4
+#: times to first order is 2.6 times. Ten times larger, points inside such steps are not found.
+_GROWS = 4
 #: Parabolas with which a minimum of a number over t is found.
 _PARABOLAS = 4
 #: Part of the domain over which g_t is taken by a difference.
@@ -45,6 +48,7 @@ class Crossing(NamedTuple):
     - ``delay`` (float)
     - ``by_x`` (ndarray, shape (n + k,)): Derivatives of the delay by the states and the free parameters, scaled.
     - ``gap`` (ndarray, shape (n,)): f- - f+, scaled.
+    - ``gap_by_x`` (ndarray, shape (n, n + k)): Its derivatives.
     - ``rates`` (tuple of float): g' before and behind, positive where g goes to the side behind.
     """
 
@@ -53,6 +57,7 @@ class Crossing(NamedTuple):
     delay: float
     by_x: Array
     gap: Array
+    gap_by_x: Array
     rates: tuple[float, float]
 
     @property
@@ -61,14 +66,19 @@ class Crossing(NamedTuple):
         return self.gap * self.delay
 
     @property
+    def shift_by_x(self) -> Array:
+        """Its derivatives, shape (n, n + k)."""
+        return np.outer(self.gap, self.by_x) + self.delay * self.gap_by_x
+
+    @property
     def by_states(self) -> Array:
-        """The saltation matrix."""
-        return np.eye(self.gap.size) + np.outer(self.gap, self.by_x[: self.gap.size])
+        """The saltation matrix, with the first order in the delay."""
+        return np.eye(self.gap.size) + self.shift_by_x[:, : self.gap.size]
 
     @property
     def by_free(self) -> Array:
         """Derivatives of u+ by the free parameters, shape (n, k)."""
-        return np.outer(self.gap, self.by_x[self.gap.size :])
+        return self.shift_by_x[:, self.gap.size :]
 
 
 def deciding(batch: Batch, t: Array, u: Array, p: Array) -> Array:
@@ -114,14 +124,17 @@ def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
         t, u = system.mesh[j : j + 1], system._scaled_states(x)[[system.degree * j]]
         rest = u, np.empty((0, n)), system.scaled_parameters(x)
         values, slopes = numbers.jacobian(t, *rest, numbers.columns(system._free))
-        (before,), (behind,) = (each.values(t, *rest)[:, :n] for each in (first, last))
+        both = [each.jacobian(t, *rest, each.columns(system._free)) for each in (first, last)]
+        (before, behind), (of_before, of_behind) = zip(*((each[0, :n], by_x[0, :n]) for each, by_x in both))
         in_time = 0.0
         if batch.signature.times:
             in_time = float(np.subtract(*(numbers.values(t + part, *rest)[0, k] for part in (later, -later)))) / (2 * later)
         slope = slopes[0, k]
         rate, after = (in_time + slope[:n] @ each for each in (before, behind))
         signs = sides[j, k] * rate, sides[j, k] * after
-        found.append(Crossing(j, k, float(-values[0, k] / rate), -slope / rate, before - behind, signs))
+        delay, known = float(-values[0, k] / rate), float(system._crosses > 1)
+        by_x = -(slope + known * delay * slope[:n] @ of_before) / rate
+        found.append(Crossing(j, k, delay, by_x, before - behind, known * (of_before - of_behind), signs))
     return found
 
 
@@ -143,10 +156,13 @@ def crossing_places(system: Any, x: Array) -> Switching:
 
 
 def next_places(system: Any, x: Array) -> Array:
-    """Return where crossings are; raise Grazing where a piece between them would lose most of its length."""
+    """Return where crossings are; raise Grazing where a piece loses most of its length, ConvergenceError if it grows much."""
     found = crossing_places(system, x)
     ends = ends_of(system, system.crossings(x))
-    lost = np.diff([ends[0], *found.places, ends[-1]]) < (1 - _SHRINKS) * np.diff(ends)
+    lengths, known = np.diff([ends[0], *found.places, ends[-1]]), np.diff(ends)
+    if (lengths > _GROWS * known).any():
+        raise ConvergenceError("a piece between jumps grows too fast to be known to first order")
+    lost = lengths < (1 - _SHRINKS) * known
     if lost.any():
         at = int(np.argmax(lost))
         which = checks.listed(dict.fromkeys(found.names[max(at - 1, 0) : at + 1]))

@@ -14,13 +14,15 @@ that grows as the square root of the excess, and some branches bend sharply.
 from __future__ import annotations
 
 import functools
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.boundary.crossings import deciding, ends_of, highest, outcomes
+from contin.boundary.crossings import changes, deciding, ends_of, highest, outcomes
 from contin.collocation.mesh import halved, interpolation, moved_to_breaks
 from contin.core.labels import Label
 from contin.core.newton import Newton, correct
@@ -36,6 +38,8 @@ from contin.levels import APART, BESIDE, DOUBLED, LOCATED, MOST_UPDATES, ROUGH, 
 #: Half the time, as a part of the domain, for which the equations are other ones at the first point behind a grazing point: the
 #: largest for which Newton's method converges is taken. At the last one the excess is round-off.
 _LASTS = (1e-3, 1e-4, 1e-5, 1e-6)
+#: Solutions with given times between crossings behind a jump: each shrinks the error of their middle by the time between them.
+_WINDOWS = 4
 
 
 class Extremum(NamedTuple):
@@ -115,12 +119,14 @@ class Touch(Finding):
     - ``names`` (tuple of str): The conditions, as they are written.
     - ``extrema`` (tuple of Extremum): Of the numbers that touch zero.
     - ``folds`` (bool): The primary parameter turns there.
+    - ``jumps`` (float): 1 where the equations jump and the branch leads to the crossings, -1 where it comes from them, else 0.
     """
 
     names: tuple[str, ...]
     extrema: tuple[Extremum, ...]
     x: Array
     folds: bool = False
+    jumps: float = 0.0
     nullity = 0
     has_equations = True
 
@@ -151,26 +157,82 @@ class Touch(Finding):
         The excess of the first number is held, and mesh points lie where the numbers change their signs. Where it falls there
         is no need: the solution becomes smooth.
         """
-        system, first, problem = trial.system, self.extrema[0], ConvergenceError("no point is found behind it")
-        length, around = np.ptp(system.mesh), first.time + ROUGH * np.ptp(system.mesh) * np.array([-1.0, 0.0, 1.0])
-        bend = -first.side * (_there(system, trial.x)(around)[:, first.condition] @ [1, -2, 1]) / (ROUGH * length) ** 2
-        rate = first.side * _number(system, trial.x, first)[1] @ trial.tangent
-        for last in _LASTS if rate > 0 else ():
-            places = np.add.outer(self.times, [-last * length, last * length]).ravel()
-            breaks = np.append(system._all_breaks(trial.x, closely=False), places % 1.0 if system.is_cycle else places)
-            other, carry = system.on_mesh(moved_to_breaks(system.mesh, np.unique(breaks)))
-            x = carry(trial.x + bend * (last * length) ** 2 / 2 / rate * trial.tangent)
+        first, length, problem = self.extrema[0], np.ptp(trial.system.mesh), ConvergenceError("no point is found behind it")
+        there, around = _there(trial.system, trial.x), first.time + ROUGH * length * np.array([-1.0, 0.0, 1.0])
+        bend = -first.side * (there(around)[:, first.condition] @ [1, -2, 1]) / (ROUGH * length) ** 2
+        rate = first.side * _number(trial.system, trial.x, first)[1] @ trial.tangent
+        for half in np.array(_LASTS) * length if rate > 0 or self.jumps else ():
             try:
+                if self.jumps:
+                    other, x, start = self._across(trial, half, bend, newton)
+                else:
+                    other, carry = _on_window(trial.system, trial.x, self.extrema, half)
+                    x = start = carry(trial.x)
+                    x = x + bend * half**2 / 2 / rate * carry(trial.tangent)
                 for _ in range(ROUNDS):
                     row = _number(other, x, first)[1]
                     x = correct(other, x, row, row @ x, newton).x
                     moved = other.on_switches(x)
+                    if moved is None and any(min(each.rates) <= 0 for each in other.crossings(x)):
+                        raise ConvergenceError("a solution there would slide")
                     if moved is None:
-                        return other, x, linearization(other, x, first.side * row).tangent
-                    other, x = moved[0], moved[1](x)
+                        row = other.weights * (x - start) if self.jumps else first.side * row
+                        return *other.crossed(x), linearization(other, x, row).tangent
+                    other, x, start = moved[0], moved[1](x), moved[1](start)
             except ConvergenceError as error:
                 problem = error
         raise problem
+
+    def _across(self, trial: Trial, half: float, bend: float, newton: Newton) -> tuple[Any, Array, Array]:
+        """Return system, x and the grazing solution on the other side of a jump; raise ConvergenceError where there is none.
+
+        With crossings the solution changes with the time 2 ``half`` between them, and their middle with it, but the excess with
+        its square. So times and excess follow from solutions with given times at which outcomes change.
+        """
+        extrema, height = self.extrema, self.jumps * bend * half**2 / 2
+        for _ in range(_WINDOWS if self.jumps > 0 else 1):
+            other, carry = _on_window(trial.system, trial.x, extrema, half)
+            x = start = carry(trial.x)
+            other = with_sides_near(other, x, extrema, half) if self.jumps > 0 else other
+            held = other.with_pieces(other._pieces, crosses=0)
+            value, row, _ = _number(held, x, extrema[0])
+            x = correct(held, x, row, row @ x - value + extrema[0].side * height, newton).x
+            ends = [each.side * _there(held, x)(each.time + half * np.array([-1, 1]))[:, each.condition] for each in extrema]
+            extrema = tuple(each._replace(time=each.time + (b - a) / (2 * half * bend)) for each, (a, b) in zip(extrema, ends))
+            height -= ends[0].mean() * (self.jumps > 0)
+        if self.jumps * height < 0:
+            raise ConvergenceError("the number does not come back to zero")
+        return other, x, start
+
+
+def _on_window(system: Any, x: Array, extrema: Sequence[Extremum], half: float) -> tuple[Any, Carrier]:
+    """Return the same on a mesh with points at a time before and behind extrema, and the carrier."""
+    places = np.add.outer([each.time for each in extrema], [-half, half]).ravel()
+    breaks = np.append(system._all_breaks(x, closely=False), places % 1.0 if system.is_cycle else places)
+    moved: tuple[Any, Carrier] = system.on_mesh(moved_to_breaks(system.mesh, np.unique(breaks)))
+    return moved
+
+
+def with_sides_near(system: Any, x: Array, extrema: Sequence[Extremum], away: float) -> Any:
+    """Return the same with frozen outcomes: those of x but, of the numbers of extrema, within a time ``away`` their own.
+
+    With ``away`` zero it is the other outcome, as long as they have their own.
+    """
+    t, h, sides = (system.mesh[1:] + system.mesh[:-1]) / 2, np.diff(system.mesh), system.outcomes.copy()
+    if not sides.size:
+        sides = outcomes(system.problem.batch("field"), t, system.evaluate(x, t), system.all_parameters(x))
+    for each in extrema:
+        apart = np.abs(t - each.time)
+        apart = np.minimum(apart, 1 - apart) if system.is_cycle else apart
+        own = sides[:, each.condition] == each.side
+        if away:
+            sides[apart < away, each.condition] = each.side
+        elif apart[first := int(np.where(own, apart, np.inf).argmin())] < h[first]:
+            for way in (range(first, first - t.size, -1), range(first + 1, first + t.size)):
+                inside = itertools.takewhile(lambda i: own[i % t.size] and (system.is_cycle or 0 <= i < t.size), way)  # noqa: B023
+                sides[[i % t.size for i in inside], each.condition] = -each.side
+    at = changes(sides)
+    return system.with_pieces((system.mesh[at], sides[[0, *at]]))
 
 
 def _number(system: Any, x: Array, at: Extremum) -> tuple[float, Array, float]:
@@ -221,10 +283,16 @@ def _changes(arc: Arc) -> Indices:
     return np.where(np.abs(change) > (first.ends != last.ends).sum(axis=0), change, 0)
 
 
-def _located(arc: Arc, pending: list[Extremum]) -> tuple[SpecialPoint | None, list[Extremum]]:
+def _is_alike(one: Extremum, other: Extremum, known: Numbers, part: float) -> bool:
+    """Return whether two numbers touch zero at once."""
+    return abs(one.excess - other.excess) <= part * abs(other.excess) + DOUBLED * known.sizes[one.condition]
+
+
+def _located(arc: Arc, pending: list[Extremum], ahead: bool) -> tuple[SpecialPoint | None, list[Extremum]]:
     """Return the point of a step at which the first of some numbers touches zero, and those that do not touch there.
 
-    There is no point where the number has no corner.
+    There is no point where the number has no corner. Where the equations jump it is a point ``ahead``, with the outcomes of the
+    solution that does not cross: no step passes it.
     """
     system, first = cast(Any, arc.state.system), pending[0]
     before, after = (first.at(system, end.x).excess for end in (arc.before, arc.trial))
@@ -232,30 +300,38 @@ def _located(arc: Arc, pending: list[Extremum]) -> tuple[SpecialPoint | None, li
     batch, x = system.problem.batch("field"), arc.guess(arc.low + (arc.step - arc.low) * part)
     names = [source(batch, place) or "a condition" for place in batch.conditions(range(len(system.parameters)))]
     try:
-        near = first.nearest(system, numbers(system, x).extrema) or first
-        if np.isnan(_number(system, x, near)[2]):
-            return None, pending[1:]  # the equations jump
+        known = numbers(system, x)
+        near, jumps = first.nearest(system, known.extrema) or first, 0.0
+        if np.isnan(_number(system, x, near)[2]) or (ahead and before > 0 and system.outcomes.size):
+            if not ahead:
+                return None, pending[1:]
+            jumps = 1.0 if before < 0 else -1.0
+            alike = [each for each in known.extrema if _is_alike(each, near, known, ROUGH)]
+            system = with_sides_near(system, x, alike, 0.0)
         x = _touching(system, x, near, arc.newton)
         at = inner(system, arc.state.tangent, x - arc.state.x)
         if not arc.low - APART * arc.step <= at <= (1 + APART) * arc.step or not arc.passes_by(x, at):
             raise ConvergenceError("it is no point of the step")
+        there = Trial(system, x, lambda: linearization(system, x, arc.state.row))
+        if jumps < 0:  # the other tangent
+            gone = (x - arc.state.x) / np.sqrt(inner(system, x - arc.state.x, x - arc.state.x))
+            there = Trial(system, x, Linearization(gone, arc.state.sign))
+        end = settled(there, arc.state.tangent, arc.newton).settled  # where the equations' other corners are at mesh points
     except ConvergenceError:
         name = f"grazing: {names[first.condition]}"
         return SpecialPoint(arc.step, Label.GRAZING, name, arc.trial, is_located=False), pending[1:]
-    there = Trial(system, x, lambda: linearization(system, x, arc.state.row))
-    end = settled(there, arc.state.tangent, arc.newton).settled  # where the equations' other corners are at mesh points
     known, one = numbers(end.system, end.x), near.at(end.system, end.x)
     one = one.nearest(system, known.extrema) or one
-    every = [each for each in known.extrema if abs(each.excess - one.excess) < DOUBLED * known.sizes[each.condition]]
+    every = [each for each in known.extrema if _is_alike(each, one, known, 0.0)]
     every = sorted({one, *every}, key=lambda each: each != one)
     met = [first, *(each.nearest(system, pending) for each in every)]
-    matters = [each for each in every if _number(system, x, each)[2] > LOCATED]
-    touch = Touch(tuple(names[each.condition] for each in matters), tuple(matters), x)
+    matters = [each for each in every if not _number(system, x, each)[2] <= LOCATED]
+    touch = Touch(tuple(names[each.condition] for each in matters), tuple(matters), x, jumps=jumps)
     point = SpecialPoint(at, Label.GRAZING, touch.text, there, details=touch) if matters else None
     return point, [each for each in pending if each not in met]
 
 
-def _search(arc: Arc, _: object) -> list[SpecialPoint]:
+def _search(arc: Arc, _: object, ahead: bool = False) -> list[SpecialPoint]:
     """Return the grazing points inside a step, those at which several numbers touch zero once."""
     change, pending, found = _changes(arc), list[Extremum](), list[SpecialPoint]()
     for k in np.flatnonzero(change).tolist():
@@ -263,7 +339,7 @@ def _search(arc: Arc, _: object) -> list[SpecialPoint]:
         new = [each for each in numbers(more.system, more.x).extrema if each.condition == k and each.excess > 0]
         pending += sorted(new, key=lambda each: each.excess)[: abs(change[k]) // 2]
     while pending:
-        point, pending = _located(arc, pending)
+        point, pending = _located(arc, pending, ahead)
         found += [] if point is None else [point]
     return found
 
@@ -276,7 +352,8 @@ def touch_ahead(state: State, step: float) -> SpecialPoint | None:
     here = Linearization(state.tangent, state.sign)
     ends = [Trial(state.system, state.x + way * state.tangent, here) for way in (0.0, step)]
     arc = Arc(state, (0.0, ends[0]), ends[1], step, Newton())
-    points = _search(arc, None) if not state.singular else []
+    slides = any(each.rates[0] > 0 > each.rates[1] for each in cast(Any, state.system).crossings(ends[1].x))
+    points = _search(arc, None, ahead=True) if not (state.singular or slides) else []
     return min((point for point in points if point.is_located), key=lambda point: point.at, default=None)
 
 
@@ -288,7 +365,7 @@ def grazing() -> Event:
 
 @functools.cache
 def jumping() -> list[Event]:
-    """Return the test functions that end a run: where a piece vanishes, a threshold is touched, or a solution would slide."""
+    """Return the test functions that end a run: where a piece vanishes, or a solution would slide."""
 
     def of(trial: Trial) -> Any:
         return trial.settled.system.crossings(trial.settled.x)
@@ -302,7 +379,6 @@ def jumping() -> list[Event]:
 
     return [
         Event(Label.GRAZING, "grazing", shortest, terminal=True),
-        Event(Label.GRAZING, "grazing", lambda trial: clearance(trial.settled.system, trial.settled.x)[0], terminal=True),
         Event(Label.SLIDING, "sliding", slides, terminal=True),
     ]
 

@@ -42,7 +42,7 @@ from contin.errors import Grazing, ProblemError
 from contin.events.arc import SpecialPoint
 from contin.events.labelled import Stability
 from contin.functions.batch import Batch, Columns
-from contin.levels import APART, CORRECTED, LOCATED
+from contin.levels import APART, CORRECTED
 from contin.linalg.blocks import Blocks, Factors, Layout, Share, is_large, layout, run, share
 from contin.linalg.border import random_rows
 from contin.linalg.components import Around, Component, ComponentFactors, Part, components
@@ -125,8 +125,8 @@ class Collocation(Composed):
     _pieces: tuple[Array, Array] | None = None
     #: Those of the solution at which functions were evaluated last: derivatives by points become derivatives by x with them.
     _last_crossings: Sequence[Crossing] = ()
-    #: Jumps that a step crosses with outcomes that are not frozen, because one of them passes an end of the period; else 0.
-    _round: int = 0
+    #: 2: with crossings and their derivatives; 1: these as at mesh points; 0: outcomes change at mesh points themselves.
+    _crosses: int = 2
 
     def __init__(
         self, problem: Statement, mesh: Places, degree: int, free: Sequence[str], parameters: Mapping[str, float],
@@ -309,18 +309,21 @@ class Collocation(Composed):
 
     def crossings(self, x: Array) -> Sequence[Crossing]:
         """Return the mesh points at which a solution crosses jumps; none where outcomes are not frozen."""
-        if self.outcomes.size:
+        if self.outcomes.size and self._crosses:
             self._last_crossings = self._once("crossings", x, lambda: crossings(self, self._field, x))
         return self._last_crossings
 
-    def with_pieces(self, pieces: tuple[Array, Array] | None) -> Self:
-        """Return the same with other frozen outcomes."""
+    def with_pieces(self, pieces: tuple[Array, Array] | None, crosses: int = 2) -> Self:
+        """Return the same with other frozen outcomes; ``crosses`` 0: they change at mesh points, wherever the crossings are.
+
+        With 1 derivatives are those of crossings at the mesh points. From far away Newton's method finds more with these.
+        """
         if pieces is None and self._pieces is None:
             return self
         other = self._copied()
         for name in (*_ON_A_MESH, "_layout", "_columns", "_components", "outcomes"):
             vars(other).pop(name, None)
-        other._pieces, other._round = pieces, 0
+        other._pieces, other._crosses = pieces, crosses
         other._take_pieces(self.mesh)
         return other
 
@@ -350,24 +353,18 @@ class Collocation(Composed):
         if settled and any(np.abs(each.shift).max() > APART for each in self.crossings(x)):
             raise Grazing("met grazing: no solution with these jumps is found there")
         found = self.switching(x)
-        if self._round and found.jumps.sum() != self._round:
-            raise Grazing("met grazing: a piece between jumps of the equations vanishes")
-        if self.outcomes.size and self.contradicts(x) and (why := clearance(self, x))[0] < 0:
+        if (why := clearance(self, x))[0] < 0:
             raise Grazing(f"met grazing: {why[1]}")
-        if not (self.outcomes.size or self._round or state.singular) and found.jumps.any():
+        if not (self.outcomes.size or state.singular) and found.jumps.any():
             at = int(np.argmax(found.jumps))
             which = f"{found.names[at]}, where the equations jump"
             raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
-
-    def _jumps(self, x: Array) -> int:
-        """Return the number of jumps that a solution crosses, without those that do not matter."""
-        return len([each for each in self.crossings(x) if np.abs(each.gap).max() > LOCATED])
 
     def stepped(self, x: Array, change: Array) -> tuple[Self, Array]:
         """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""
         mesh, at, after = stepped(self, x, change)
         assert self._pieces is not None
-        other = self.with_pieces((at, self._pieces[1]))
+        other = self.with_pieces((at, self._pieces[1]), self._crosses)
         return other.on_mesh(mesh)[0], after
 
     def contradicts(self, x: Array) -> bool:

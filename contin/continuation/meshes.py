@@ -215,7 +215,8 @@ class MeshPolicy:
             end, known = arc.trial.settled, (run.state, run.here())
             if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break
-            other = finer(end.system, end.x, accuracy.error, control)
+            there = run.state if end.system.outcomes.size else end  # the state has other crossings than the end
+            other = finer(there.system, there.x, accuracy.error, control)
             if other is not None and not end.system.outcomes.size:
                 mesh = other[0]  # it has points where the end meets corners; the state has others
                 mesh = (mesh.on_switches(run.state.system.carrier(mesh)(run.state.x)) or other)[0]

@@ -28,10 +28,11 @@ from contin.continuation.points import IndexChange, Notes, index_changes, is_con
 from contin.continuation.rules import JUMPS, NOISY, judged, length_of, predict
 from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
+from contin.core.newton import correct
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings, check
 from contin.core.small import FAILED
-from contin.core.step import CLEAR, Reason, State, Stop, corrected, settled
+from contin.core.step import CLEAR, Reason, State, Stop, settled, trial_of
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError, Grazing
 from contin.events.arc import Arc, SpecialPoint, with_details
@@ -333,6 +334,8 @@ class Continuation:
                 behind = on_branch(*touch.beyond(point.trial, self.settings.newton), settings=self.settings, singular=False)
                 length, accepted = arc.state.arclength + point.at, arc.state.accepted + 1
                 behind = dataclasses.replace(behind, arclength=length, accepted=accepted)
+        if touch.jumps and behind is None:
+            return dataclasses.replace(point, stop=Stop(Reason.EVENT, "met grazing", event="grazing")), None
         ends = arc.state.tangent, (behind or arc.trial.settled).tangent
         free = arc.state.system.free
         rates = [tangent[free.index(self.primary) - len(free)] for tangent in ends]
@@ -395,7 +398,13 @@ class Continuation:
         arc = Arc(self.state, (0.0, self.here()), point.trial, point.at, self.settings.newton)
         judgement = judged(self.state, self.predicted(point.at), point.trial, point.at, self.settings)
         inspection = self._watch.inspection(arc)
-        if judgement.outcome in (FAILED, JUMPS) or self._watch.doubt(inspection):
+        if judgement.outcome in (FAILED, JUMPS):
+            return None
+        if point.details.jumps < 0:  # what the equations say has no limit there
+            at = self.state.system.parameter_index(self.primary)
+            turns = point.trial.tangent[at] * self.state.tangent[at] < 0
+            return None if turns or any(map(arc.passes, self._meshes.tests)) else Step(arc, judgement, [point])
+        if self._watch.doubt(inspection):
             return None
         others = [other for other in inspection.special_points if not isinstance(other.details, Touch)]
         return Step(arc, judgement, [*others, point], bool(inspection.folds))
@@ -403,19 +412,18 @@ class Continuation:
     def _went_round(self, step: float, error: Grazing) -> bool:
         """Go on where a jump of the equations passes an end of the period in a step; return whether one did.
 
-        No point is made. The step is made with outcomes that are not frozen, and frozen ones are found at its end.
+        No point is made. The crossing lies as far before one end as it has been behind the other, and moves on from there.
         """
         state, newton = self.state, self._steps.settings.newton
-        other = state.system.round_end(state.x, error)
-        if other is None:
+        if (other := state.system.round_end(state.x, error)) is None:
             return False
-        state = dataclasses.replace(state, system=other)
+        system, carry = other
+        x, tangent = carry(predict(state, step, self.settings)), carry(state.tangent)
+        row = system.weights * tangent
         with contextlib.suppress(ConvergenceError):
-            trial = corrected(state, predict(state, step, self.settings), step, newton)
-            end = settled(trial, state.tangent, newton).settled
+            end = settled(trial_of(system, correct(system, x, row, row @ x, newton), row), tangent, newton).settled
             end.system.check_jumps(end.x, state)
-            system, x = end.system.crossed(end.x)
-            behind = on_branch(system, x, self.state.system.carrier(system)(state.tangent), self.settings, False)
+            behind = on_branch(end.system, end.x, end.tangent, self.settings, False)
             kept = {name: getattr(state, name) for name in ("step", "accepted", "sense", "sensed")}
             return self.go_on((dataclasses.replace(behind, arclength=state.arclength + step, **kept), None))
         return False

@@ -275,7 +275,7 @@ class Discretization(Equations, Protocol):
         return None
 
     def round_end(self, x: Array, error: Exception) -> Any:
-        """Return the system for a step in which a jump of the equations passes an end of the period, or None."""
+        """Return the system for a step in which a jump passes an end of the period, and the carrier, or None."""
         return None
 
     def home_ahead(self, state: Any, step: float) -> Any:

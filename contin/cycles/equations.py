@@ -14,9 +14,10 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.boundary.system import Collocation
 from contin.collocation.corners import breaks_of
+from contin.collocation.mesh import moved_to_breaks
 from contin.collocation.round import DRIFTED, FULL, Monodromy, ends_of_parts, extremes, fill_multipliers, larger, monodromy_of
 from contin.core.labels import Label
-from contin.core.protocol import Discretization
+from contin.core.protocol import Carrier, Discretization
 from contin.core.spectral import on_circle
 from contin.core.step import COLLAPSED, Reason, State, Stop
 from contin.core.trial import Event, Trial
@@ -356,14 +357,18 @@ class PeriodicCollocation(OfCycles, Collocation):
             return None
         return at_special_point(self, point)
 
-    def round_end(self, x: Array, error: Any) -> Self | None:
-        """Return the system for a short step in which a crossing leaves at an end of the period and comes in at the other."""
-        places, (first, last) = [self.mesh[each.node] for each in self.crossings(x)], self.mesh[[0, -1]]
-        if not error.at_end or min(places[0] - first, last - places[-1]) > ROUGH * (last - first):
+    def round_end(self, x: Array, error: Any) -> tuple[Self, Carrier] | None:
+        """Return the same with a crossing that leaves at an end of the period and comes in at the other, and the carrier."""
+        if not error.at_end or self.order > 1 or self._pieces is None:
             return None
-        other = self.with_pieces(None)
-        other._round = self._jumps(x)
-        return other
+        (at, sides), first, last = self._pieces, self.mesh[0], self.mesh[-1]
+        if min(at[0] - first, last - at[-1]) > ROUGH * (last - first) or (sides[0] != sides[-1]).any():
+            return None
+        if at[0] - first < last - at[-1]:
+            pieces = np.append(at[1:], last - (at[0] - first)), sides[[*range(1, len(sides)), 1]]
+        else:
+            pieces = np.append(first + last - at[-1], at[:-1]), sides[[-2, *range(len(sides) - 1)]]
+        return self.with_pieces(pieces).on_mesh(moved_to_breaks(self.mesh, np.union1d(pieces[0], self.breaks)))
 
 
 class ForcedCollocation(PeriodicCollocation):

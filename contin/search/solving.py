@@ -225,6 +225,7 @@ def _jumps(system: Any, x: Array) -> str:
 def _moved(system: Any, x: Array, held: str | None) -> tuple[Any, Array]:
     """Return a guess with its crossings where Newton's method takes them, up to what one correction on a mesh leaves."""
     step = np.full(MOST_UPDATES if system.outcomes.size else 0, np.inf)
+    system = system.with_pieces(system._pieces, crosses=1) if step.size else system
     for _ in step:
         rows = [] if held is None else [np.eye(1, system.size, system.parameter_index(held))[0]]
         residual, factors = system.linearize(x, rows)
@@ -232,7 +233,7 @@ def _moved(system: Any, x: Array, held: str | None) -> tuple[Any, Array]:
         if not ROUGH < np.abs(step / (1 + np.abs(x))).max() < np.inf:
             break
         system, x = system.stepped(x, step)
-    return system, x
+    return system.with_pieces(system._pieces) if system.outcomes.size else system, x
 
 
 def _on_switches(system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]) -> tuple[System, Corrected]:

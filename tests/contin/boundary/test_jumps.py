@@ -168,17 +168,82 @@ def test_a_threshold_that_is_touched_is_located():
     problem = contin.BoundaryValueProblem(
         lambda t, u, p: (u.v, -p.q - 0.3 * (u.u > 0.1) - 0.3 * (u.u > 0.3)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 1.0}
     )
-    branch = contin.trace(contin.solve(problem, lambda t: (t * (1 - t), 1 - 2 * t)), free=["q"], limits={"q": (0.5, 4)})
+    branch = contin.trace(
+        contin.solve(problem, lambda t: (t * (1 - t), 1 - 2 * t), {"q": 2.0}), free=["q"], limits={"q": (1.9, 2.2)}
+    )
 
     def excess(q):
         first, there = math.sqrt(2 * (0.3 * q + 0.06)), math.sqrt(0.4 * (q + 0.3))
         return (first - there) / q + math.sqrt(0.4 / (q + 0.3)) - 0.5
 
-    assert branch[-1].label == "GR" and "u.u > 0.3" in branch.stop.message
-    within = 1e-10 if branch[-1].errors else 1e-6  # not located, it has no error: it lies within the least step
-    assert abs(branch[-1]["q"] - brentq(excess, 1, 3, xtol=1e-14)) < within and ("possible" in str(branch[-1])) is (
-        within == 1e-6
+    (touch,) = branch.labelled("GR")
+    assert "u.u > 0.3" in touch.name and touch.details.folds and branch[-1]["q"] == 2.2 and not branch.notes
+    assert abs(touch["q"] - brentq(excess, 1, 3, xtol=1e-14)) < 1e-12
+    below = contin.solve(problem, lambda t: (0.4 * t * (1 - t), 0.4 - 0.8 * t), {"q": 0.79})
+    (first,) = contin.trace(below, free=["q"], limits={"q": (0.75, 2.0)}, max_points=8).labelled("GR")
+    assert abs(first["q"] - 0.8) < 1e-12 and first.details.folds
+
+
+def relay(c, w, k, force):
+    """x'' + c x' + x + k [x > 1] = F cos w t."""
+    problem = contin.CycleProblem(
+        lambda t, u, p: (u.v, -u.x - c * u.v - k * (1.0 if u.x > 1 else 0.0) + p.F * np.cos(w * t)), ["x", "v"], {"F": force},
+        period=2 * math.pi / w,
+    )  # fmt: skip
+    answer = force / (1 - w**2 + 1j * w * c)
+    return contin.solve(
+        problem, lambda t: ((answer * np.exp(2j * np.pi * t)).real, (1j * w * answer * np.exp(2j * np.pi * t)).real)
     )
+
+
+def off_the_exact_cycle(point, c, w, k):
+    """Return by how much one period, in closed form between the times of the crossings, misses the threshold and the start."""
+    system, period = point.system, 2 * math.pi / w
+    a = np.zeros((5, 5))  # x, v, cos w t, sin w t, 1
+    a[0, 1], a[1, :3], a[2, 3], a[3, 2] = 1, (-1, -c, point["F"]), -w, w
+    on = a.copy()
+    on[1, 4] = -k
+    times = period * np.concatenate([[0], [system.mesh[each.node] for each in system.crossings(point.x)], [1]])
+    sides = [float(system.evaluate(point.x, np.array([(t + s) / 2 / period]))[0, 0] > 1) for t, s in zip(times, times[1:])]
+    first = np.array([*system.evaluate(point.x, np.zeros(1))[0], 1, 0, 1])
+    u, off = first, []
+    for length, side in zip(np.diff(times), sides):
+        u = expm((on if side else a) * length) @ u
+        off.append(u[0] - 1)
+    return np.abs([*off[:-1], *(u - first)[:2]]).max()
+
+
+@pytest.mark.parametrize(
+    ("c", "w", "k", "labels"),
+    [
+        pytest.param(0.1, 0.7, 0.4, "GR PD", marks=pytest.mark.full),
+        (0.3, 1.4, 0.4, "GR LP"),
+        pytest.param(0.1, 0.7, -0.4, "GR LP", marks=pytest.mark.full),
+        (0.3, 1.4, -0.4, "GR PD"),
+    ],
+)
+def test_a_relay_that_begins_to_switch(c, w, k, labels):
+    """The amplitude of the linear oscillator is 1 where F^2 = (1 - w^2)^2 + (c w)^2; from both sides it is the same point."""
+    force = math.hypot(1 - w**2, c * w)
+    branch = contin.trace(relay(c, w, k, 0.8 * force), free=["F"], limits={"F": (0.5 * force, 1.13 * force)})
+    back = contin.trace(branch[-1], free=["F"], direction=-1, limits={"F": (0.5 * force, 1.13 * force)})
+    for run, wanted in (branch, labels.split()), (back, labels.split()[::-1]):
+        assert [point.label for point in run if point.label] == ["EP", *wanted, "EP"] and not run.notes
+        (touch,) = run.labelled("GR")
+        assert abs(touch["F"] - force) < 1e-12 and touch.details.folds is ("LP" in labels)
+        for point in run.points[::4]:
+            assert off_the_exact_cycle(point, c, w, k) < 1e-9
+    assert back[-1]["max_x"] < 1 < branch[-1]["max_x"]
+
+
+def test_a_relay_that_would_slide():
+    """A speed at which a friction begins: right behind it the solution sticks there, and the run ends."""
+    problem = contin.CycleProblem(
+        lambda t, u, p: (u.v, -u.x - 0.3 * u.v - 0.4 * (u.v > 1) + p.F * np.cos(1.4 * t)), ["x", "v"], {"F": 0.6},
+        period=2 * math.pi / 1.4,
+    )  # fmt: skip
+    end = contin.trace(contin.cycle(problem, [0.1, 0.0]), free=["F"], limits={"F": (0.5, 2)})[-1]
+    assert end.label == "GR" and abs(end["F"] - math.hypot(1 - 1.4**2, 0.3 * 1.4) / 1.4) < 1e-12
 
 
 def test_corners_may_come_and_go():
