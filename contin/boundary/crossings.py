@@ -1,13 +1,13 @@
 """Jumps of the equations that the solution decides: outcomes of conditions frozen on each interval, crossings at mesh points.
 
 A crossing lies at a mesh point but for what a solution moves it by. With g the number that decides, f- and f+ the right sides
-before and behind it, and u the states at the mesh point, it happens later by
+before and behind it, u the states at the mesh point, and dots for derivatives along the solution before, it happens later by
 
-    delay = -g / g',   g' = g_t + g_u f-,
+    delay T:   g + g' T + g'' T^2 / 2 = 0,   g' = g_t + g_u f-,   g'' = g_u f-',
 
-and the interval behind begins with other states, to first order in the delay:
+and the interval behind begins with other states, to second order in the delay:
 
-    u+ = u + (f- - f+) delay,   du+/du = 1 + (f+ - f-) g_u / g'   (the saltation matrix, where the delay is zero).
+    u+ = u + (f- - f+) T + c T^2,   du+/du = 1 + (f+ - f-) g_u / g'   (the saltation matrix, where T is zero).
 
 Mesh points are moved by the delays until these are round-off. So no polynomial crosses a jump, and derivatives by states and
 parameters, tangents and multipliers are those of the solution with its jumps.
@@ -27,7 +27,7 @@ from contin.collocation.mesh import interpolation
 from contin.errors import ConvergenceError, Grazing
 from contin.functions.batch import Batch, Piecewise
 from contin.functions.origin import source
-from contin.levels import CORRECTED
+from contin.levels import CORRECTED, ROUGH
 
 #: Largest part of its length that a piece between crossings loses in a step of Newton's method.
 _SHRINKS = 0.8
@@ -49,6 +49,9 @@ class Crossing(NamedTuple):
     - ``by_x`` (ndarray, shape (n + k,)): Derivatives of the delay by the states and the free parameters, scaled.
     - ``gap`` (ndarray, shape (n,)): f- - f+, scaled.
     - ``gap_by_x`` (ndarray, shape (n, n + k)): Its derivatives.
+    - ``rate_by_x`` (ndarray, shape (n + k,)): Those of g' before, relative to it.
+    - ``curved`` (ndarray, shape (n,)): c.
+    - ``bend`` (float): g'' / g'.
     - ``rates`` (tuple of float): g' before and behind, positive where g goes to the side behind.
     """
 
@@ -58,27 +61,32 @@ class Crossing(NamedTuple):
     by_x: Array
     gap: Array
     gap_by_x: Array
+    rate_by_x: Array
+    curved: Array
+    bend: float
     rates: tuple[float, float]
 
     @property
     def shift(self) -> Array:
         """The change of the states with which the interval behind begins, u+ - u."""
-        return self.gap * self.delay
+        return (self.gap + self.curved * self.delay) * self.delay
 
     @property
     def shift_by_x(self) -> Array:
         """Its derivatives, shape (n, n + k)."""
-        return np.outer(self.gap, self.by_x) + self.delay * self.gap_by_x
+        return np.outer(self.gap + 2 * self.curved * self.delay, self.by_x) + self.delay * self.gap_by_x
+
+    def shift_bent(self, v: Array) -> Array:
+        """Return the derivatives of these along v (n + k,), where the delay is zero: shape (n, n + k)."""
+        delayed = self.by_x @ v
+        bent = delayed * self.rate_by_x + (self.rate_by_x @ v + self.bend * delayed) * self.by_x
+        curved = self.gap_by_x @ v + 2 * delayed * self.curved
+        return np.outer(curved, self.by_x) + delayed * self.gap_by_x - np.outer(self.gap, bent)
 
     @property
     def by_states(self) -> Array:
         """The saltation matrix, with the first order in the delay."""
         return np.eye(self.gap.size) + self.shift_by_x[:, : self.gap.size]
-
-    @property
-    def by_free(self) -> Array:
-        """Derivatives of u+ by the free parameters, shape (n, k)."""
-        return self.shift_by_x[:, self.gap.size :]
 
 
 def deciding(batch: Batch, t: Array, u: Array, p: Array) -> Array:
@@ -116,7 +124,7 @@ def frozen(batch: Batch, sides: Array, degree: int) -> Piecewise:
 
 def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
     """Return the crossings of a solution; ``batch`` is the field in scaled units."""
-    n, sides, found = system.states_count, system.outcomes, list[Crossing]()
+    n, sides, found, known = system.states_count, system.outcomes, list[Crossing](), float(system._crosses > 1)
     every, later = range(len(system.parameters)), _LATER * (system.mesh[-1] - system.mesh[0])
     for j in changes(sides):
         (first, numbers), (last, _) = (batch.frozen(every, sides[i]) for i in (j - 1, j))
@@ -125,16 +133,21 @@ def crossings(system: Any, batch: Batch, x: Array) -> list[Crossing]:
         rest = u, np.empty((0, n)), system.scaled_parameters(x)
         values, slopes = numbers.jacobian(t, *rest, numbers.columns(system._free))
         both = [each.jacobian(t, *rest, each.columns(system._free)) for each in (first, last)]
-        (before, behind), (of_before, of_behind) = zip(*((each[0, :n], by_x[0, :n]) for each, by_x in both))
-        in_time = 0.0
+        (before, behind), (of_before, of_behind) = zip(*((each[0, :n], known * by_x[0, :n]) for each, by_x in both))
+        in_time, of_times = 0.0, [np.zeros(n)] * 2
         if batch.signature.times:
-            in_time = float(np.subtract(*(numbers.values(t + part, *rest)[0, k] for part in (later, -later)))) / (2 * later)
+            ends = [[each.values(t + part, *rest)[0] for part in (later, -later)] for each in (numbers, first, last)]
+            in_time, *of_times = (np.subtract(*each)[at] / (2 * later) for each, at in zip(ends, (k, slice(n), slice(n))))
         slope = slopes[0, k]
-        rate, after = (in_time + slope[:n] @ each for each in (before, behind))
+        rate, after = (float(in_time + slope[:n] @ each) for each in (before, behind))
         signs = sides[j, k] * rate, sides[j, k] * after
-        delay, known = float(-values[0, k] / rate), float(system._crosses > 1)
-        by_x = -(slope + known * delay * slope[:n] @ of_before) / rate
-        found.append(Crossing(j, k, delay, by_x, before - behind, known * (of_before - of_behind), signs))
+        onward = of_before[:, :n] @ before + known * of_times[0]  # f-'
+        value, bend = float(values[0, k]), float(slope[:n] @ onward) / rate
+        root = np.sqrt(max(1 - 2 * value * bend / rate, (1 - _SHRINKS) ** 2))
+        delay, rate_by_x = -2 * value / rate / (1 + root), slope[:n] @ of_before / rate
+        by_x = -(slope / rate + delay * rate_by_x) / root
+        curved = (onward - known * of_times[1] - of_behind[:, :n] @ (2 * before - behind)) / 2
+        found.append(Crossing(j, k, delay, by_x, before - behind, of_before - of_behind, rate_by_x, curved, bend, signs))
     return found
 
 
@@ -150,7 +163,8 @@ def crossing_places(system: Any, x: Array) -> Switching:
     origins = batch.conditions(range(len(batch.signature.parameters)))
     names = tuple(source(batch, origins[each.condition]) for each in found)
     ends, delays = ends_of(system, found), np.array([each.delay for each in found])
-    costs = [np.abs(each.shift / (1 + system.largest(x)[: each.gap.size])).max() for each in found]
+    moved = [(np.abs(each.gap) + ROUGH * np.abs(each.curved)) * abs(each.delay) for each in found]
+    costs = [(each / (1 + system.largest(x)[: each.size])).max() for each in moved]
     known = np.where(np.abs(delays) > CORRECTED * (mesh[-1] - mesh[0]), costs, 0.0)
     return Switching(ends[1:-1] + delays, known, np.full(len(found), True), names)
 

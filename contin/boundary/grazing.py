@@ -14,7 +14,6 @@ that grows as the square root of the excess, and some branches bend sharply.
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
@@ -163,12 +162,7 @@ class Touch(Finding):
         rate = first.side * _number(trial.system, trial.x, first)[1] @ trial.tangent
         for half in np.array(_LASTS) * length if rate > 0 or self.jumps else ():
             try:
-                if self.jumps:
-                    other, x, start = self._across(trial, half, bend, newton)
-                else:
-                    other, carry = _on_window(trial.system, trial.x, self.extrema, half)
-                    x = start = carry(trial.x)
-                    x = x + bend * half**2 / 2 / rate * carry(trial.tangent)
+                other, x, start = self._across(trial, half, bend, newton)
                 for _ in range(ROUNDS):
                     row = _number(other, x, first)[1]
                     x = correct(other, x, row, row @ x, newton).x
@@ -184,14 +178,17 @@ class Touch(Finding):
         raise problem
 
     def _across(self, trial: Trial, half: float, bend: float, newton: Newton) -> tuple[Any, Array, Array]:
-        """Return system, x and the grazing solution on the other side of a jump; raise ConvergenceError where there is none.
+        """Return system, x and the grazing solution on a mesh with points around extrema; raise ConvergenceError without any.
 
-        With crossings the solution changes with the time 2 ``half`` between them, and their middle with it, but the excess with
-        its square. So times and excess follow from solutions with given times at which outcomes change.
+        With crossings of jumps the solution changes with the time 2 ``half`` between them, and their middle with it, but the
+        excess with its square. So times and excess follow from solutions with given times at which outcomes change.
         """
-        extrema, height = self.extrema, self.jumps * bend * half**2 / 2
+        system, extrema, height = trial.system, self.extrema, (self.jumps or 1.0) * bend * half**2 / 2
         for _ in range(_WINDOWS if self.jumps > 0 else 1):
-            other, carry = _on_window(trial.system, trial.x, extrema, half)
+            places = np.add.outer([each.time for each in extrema], [-half, half]).ravel()
+            places = places % 1.0 if system.is_cycle else places
+            breaks = np.append(system._all_breaks(trial.x, closely=False), places)
+            other, carry = system.on_mesh(moved_to_breaks(system.mesh, np.unique(breaks)))
             x = start = carry(trial.x)
             other = with_sides_near(other, x, extrema, half) if self.jumps > 0 else other
             held = other.with_pieces(other._pieces, crosses=0)
@@ -205,15 +202,7 @@ class Touch(Finding):
         return other, x, start
 
 
-def _on_window(system: Any, x: Array, extrema: Sequence[Extremum], half: float) -> tuple[Any, Carrier]:
-    """Return the same on a mesh with points at a time before and behind extrema, and the carrier."""
-    places = np.add.outer([each.time for each in extrema], [-half, half]).ravel()
-    breaks = np.append(system._all_breaks(x, closely=False), places % 1.0 if system.is_cycle else places)
-    moved: tuple[Any, Carrier] = system.on_mesh(moved_to_breaks(system.mesh, np.unique(breaks)))
-    return moved
-
-
-def with_sides_near(system: Any, x: Array, extrema: Sequence[Extremum], away: float) -> Any:
+def with_sides_near(system: Any, x: Array, extrema: Sequence[Extremum] = (), away: float = 0.0) -> Any:
     """Return the same with frozen outcomes: those of x but, of the numbers of extrema, within a time ``away`` their own.
 
     With ``away`` zero it is the other outcome, as long as they have their own.
@@ -222,15 +211,14 @@ def with_sides_near(system: Any, x: Array, extrema: Sequence[Extremum], away: fl
     if not sides.size:
         sides = outcomes(system.problem.batch("field"), t, system.evaluate(x, t), system.all_parameters(x))
     for each in extrema:
-        apart = np.abs(t - each.time)
-        apart = np.minimum(apart, 1 - apart) if system.is_cycle else apart
-        own = sides[:, each.condition] == each.side
+        apart = (t - each.time + 0.5) % 1 - 0.5 if system.is_cycle else t - each.time
+        order, own = np.argsort(apart), sides[:, each.condition] == each.side
+        pieces = np.cumsum(np.diff(own[order], prepend=False))[np.argsort(order)]
+        first = int(np.where(own, np.abs(apart), np.inf).argmin())
         if away:
-            sides[apart < away, each.condition] = each.side
-        elif apart[first := int(np.where(own, apart, np.inf).argmin())] < h[first]:
-            for way in (range(first, first - t.size, -1), range(first + 1, first + t.size)):
-                inside = itertools.takewhile(lambda i: own[i % t.size] and (system.is_cycle or 0 <= i < t.size), way)  # noqa: B023
-                sides[[i % t.size for i in inside], each.condition] = -each.side
+            sides[np.abs(apart) < away, each.condition] = each.side
+        elif own.any() and abs(apart[first]) < h[first]:
+            sides[pieces == pieces[first], each.condition] = -each.side
     at = changes(sides)
     return system.with_pieces((system.mesh[at], sides[[0, *at]]))
 
@@ -307,7 +295,7 @@ def _located(arc: Arc, pending: list[Extremum], ahead: bool) -> tuple[SpecialPoi
                 return None, pending[1:]
             jumps = 1.0 if before < 0 else -1.0
             alike = [each for each in known.extrema if _is_alike(each, near, known, ROUGH)]
-            system = with_sides_near(system, x, alike, 0.0)
+            system = with_sides_near(system, x, alike)
         x = _touching(system, x, near, arc.newton)
         at = inner(system, arc.state.tangent, x - arc.state.x)
         if not arc.low - APART * arc.step <= at <= (1 + APART) * arc.step or not arc.passes_by(x, at):
@@ -383,17 +371,13 @@ def jumping() -> list[Event]:
     ]
 
 
-def clearance(system: Any, x: Array) -> tuple[float, str]:
-    """Return the least distance from a jump between crossings, at an extremum of a number over t; and where that is.
-
-    It is positive on the side whose outcome is frozen.
-    """
-    if not system.outcomes.size:
-        return 1.0, ""
-    for each in sorted(numbers(system, x).extrema, key=lambda each: -each.excess):
+def contradiction(system: Any, x: Array) -> str:
+    """Return where a number crosses zero at which the equations jump, and the outcome is frozen; "" where none does."""
+    for each in numbers(system, x).extrema if system.outcomes.size else ():
         k, t, batch = each.condition, each.time, system.problem.batch("field")
         at = np.searchsorted(system.mesh, t % 1.0 if system.is_cycle else t, side="right") - 1
-        if system.outcomes[np.clip(at, 0, system.intervals - 1), k] != each.side and np.isnan(_number(system, x, each)[2]):
+        inside = system.outcomes[np.clip(at, 0, system.intervals - 1), k] == each.side
+        if each.excess > 0 and not inside and np.isnan(_number(system, x, each)[2]):
             name = source(batch, batch.conditions(range(len(system.parameters)))[k])
-            return -each.excess, f"{name}, where the equations jump, changes its sign at t = {t:.6g}"
-    return 1.0, ""
+            return f"{name}, where the equations jump, changes its sign at t = {t:.6g}"
+    return ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -17,17 +17,8 @@ import numpy as np
 
 from contin import draws
 from contin.arrays import Array, Indices, Places
-from contin.boundary.crossings import (
-    Crossing,
-    changes,
-    crossing_places,
-    crossings,
-    frozen,
-    next_places,
-    outcomes,
-    stepped,
-)
-from contin.boundary.grazing import clearance, grazing, jumping, touch_ahead
+from contin.boundary.crossings import Crossing, crossing_places, crossings, frozen, next_places, outcomes, stepped
+from contin.boundary.grazing import contradiction, grazing, jumping, touch_ahead, with_sides_near
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
@@ -332,18 +323,20 @@ class Collocation(Composed):
         if self._pieces is not None:
             self.outcomes = self._pieces[1][np.searchsorted(self._pieces[0], (mesh[1:] + mesh[:-1]) / 2)]
 
-    def crossed(self, x: Array) -> tuple[Self, Array]:
-        """Return the same with mesh points and frozen outcomes where the equations jump along x, and x; else itself."""
+    def crossed(self, x: Array, corners: bool = False) -> tuple[Self, Array]:
+        """Return the same with mesh points and frozen outcomes where the equations jump along x, and x; else itself.
+
+        With ``corners`` also where they have corners: so crossings move with a solution, and second derivatives are known.
+        """
         if self.outcomes.size and not self.contradicts(x):
             return self, x
         system = self.with_pieces(None)
-        if not system.switching(x).jumps.any() or not self._switches_inside:
+        found = system.switching(x)
+        if not (found.places.size if corners else found.jumps.any()) or not self._switches_inside:
             return system, x
         system, carry = system.on_switches(x) or (system, np.array)
-        t, x = (system.mesh[1:] + system.mesh[:-1]) / 2, carry(x)
-        sides = outcomes(self.problem.batch("field"), t, system.evaluate(x, t), system.all_parameters(x))
-        at = changes(sides)
-        return (system.with_pieces((system.mesh[at], sides[[0, *at]])) if at else system), x
+        other = with_sides_near(system, x := carry(x))
+        return (other if len(other._pieces[0]) else system), x
 
     def check_jumps(self, x: Array, state: State, settled: bool = True) -> None:
         """Raise Grazing where x, the end of a step from a state, crosses more or fewer jumps of the equations.
@@ -353,12 +346,12 @@ class Collocation(Composed):
         if settled and any(np.abs(each.shift).max() > APART for each in self.crossings(x)):
             raise Grazing("met grazing: no solution with these jumps is found there")
         found = self.switching(x)
-        if (why := clearance(self, x))[0] < 0:
-            raise Grazing(f"met grazing: {why[1]}")
+        if why := contradiction(self, x):
+            raise Grazing(f"met grazing: {why}")
         if not (self.outcomes.size or state.singular) and found.jumps.any():
             at = int(np.argmax(found.jumps))
-            which = f"{found.names[at]}, where the equations jump"
-            raise Grazing(f"met grazing: {which}, changes its sign at t = {found.places[at]:.6g}")
+            told = f"{found.names[at]}, where the equations jump, changes its sign at t = {found.places[at]:.6g}"
+            raise Grazing(f"met grazing: {told}")
 
     def stepped(self, x: Array, change: Array) -> tuple[Self, Array]:
         """Return the same with mesh points that move with the crossings in a step of Newton's method, and x behind it."""
@@ -402,7 +395,8 @@ class Collocation(Composed):
         def by_x(slopes: Array) -> Array:
             return np.concatenate([slopes[0, :n], np.zeros(self.state_size - 2 * n), slopes[0, n:]])
 
-        inside = Term(self, self._in_pieces, self._inside, rows, weights, self._to_nodes)
+        moved = functools.partial(self._inside, along=True)
+        inside = Term(self, self._in_pieces, self._inside, rows, weights, self._to_nodes, moved)
         return inside, Term(self, self._boundary, self._at_ends, rows_at_ends, lambda w: w[None, first:last], by_x)
 
     @property
@@ -411,12 +405,43 @@ class Collocation(Composed):
         widths = self.gauss_weights
         return Term(self, self._functionals, self._inside, lambda f: widths @ f, lambda w: widths[:, None] * w, self._to_nodes)
 
-    def _inside(self, x: Array) -> Inputs:
-        """Return where functions of t are evaluated: at the Gauss points."""
+    def _inside(self, x: Array, along: bool = False) -> Inputs:
+        """Return where functions of t are evaluated: at the Gauss points; or how these change ``along`` a direction x."""
         points = self.at_gauss_points(x)
-        for each in self.crossings(x):
-            points.reshape(self.intervals, self._d, -1)[each.node] += self.basis.value[:, :1] * each.shift
+        for each in self._last_crossings if along else self.crossings(x):
+            shift = each.shift_by_x @ x[self._beside(each)] if along else each.shift
+            points.reshape(self.intervals, self._d, -1)[each.node] += self.basis.value[:, :1] * shift
         return self.gauss_times, points, _NONE(self._n), self.scaled_parameters(x)
+
+    def _beside(self, at: Crossing) -> Indices:
+        """Return the places of the states at a crossing and of the free parameters among the unknowns."""
+        first = self._n * self._d * at.node
+        return np.r_[first : first + self._n, self.state_size : self.size]
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions; two of them move the crossings."""
+        found: Array = super().along(x, directions)
+        for each, by_shift in self._of_shifts(x) if len(directions) == 2 else ():
+            a, b = (v[self._beside(each)] for v in directions)
+            found += by_shift @ each.shift_bent(a) @ b
+        return found
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x."""
+        found: Array = super().bent(x, w, v)
+        for each, by_shift in self._of_shifts(x):
+            at = self._beside(each)
+            found[at] += w @ by_shift @ each.shift_bent(v[at])
+        return found
+
+    def _of_shifts(self, x: Array) -> Iterator[tuple[Crossing, Array]]:
+        """Yield the crossings, and the derivatives of F by the states with which the intervals behind them begin."""
+        inside, both = self._terms[0], [self.basis.value[:, 0], self.basis.slope[:, 0]]
+        units = np.eye(self._n, self._n + self.problem.integral_size)
+        slopes = inside.slopes(x, inside.columns)[:, :, : self._n].transpose(2, 0, 1) if self.outcomes.size else ()
+        for each in self.crossings(x):
+            value, slope = np.kron(np.arange(self.intervals) == each.node, both)[:, :, None]
+            yield each, np.transpose([inside.rows(f * value - e * slope / self._h_points) for f, e in zip(slopes, units)])
 
     def _at_ends(self, x: Array) -> Inputs:
         """Return where boundary conditions are evaluated."""
@@ -481,11 +506,10 @@ class Collocation(Composed):
         run(assemble, given, self._segments(blocks.local.size), (True, False))
         k, q = len(self.free), self.problem.integral_size
         for each in self.crossings(x):
-            left, local, border = self._left, blocks.local[each.node], blocks.border[each.node, :q]
-            local[:, self._n * (self._d + 1) :][:, :k] += local[:, left] @ each.by_free
-            blocks.corner[:q, :k] += border[:, left] @ each.by_free
-            for block in (local, border):
-                block[:, left] = block[:, left] @ each.by_states
+            local, border, by_x = blocks.local[each.node], blocks.border[each.node, :q], each.shift_by_x
+            for block, free in (local, local[:, self._n * (self._d + 1) :]), (border, blocks.corner[:q]):
+                free[:, :k] += block[:, self._left] @ by_x[:, self._n :]
+                block[:, self._left] += block[:, self._left] @ by_x[:, : self._n]
         return self._residual(x, field, boundary), blocks
 
     @property
@@ -599,7 +623,7 @@ class Collocation(Composed):
     def _gathered(self, blocks: Array, free: Array) -> Array:
         """Return derivatives by x, shape (size,), from those by the states of each interval, (N, d + 1, n), and others."""
         for each in self._last_crossings:
-            free = free + blocks[each.node, 0] @ each.by_free
+            free = free + blocks[each.node, 0] @ each.shift_by_x[:, self._n :]
             blocks[each.node, 0] = blocks[each.node, 0] @ each.by_states
         return np.concatenate([_by_node(blocks).ravel(), free])
 
@@ -788,14 +812,9 @@ class Collocation(Composed):
         """Return the end of a run at a jump, with the conditions and times."""
         if not self.outcomes.size or stop.message not in ("met grazing", "met sliding"):
             return stop
-        why = clearance(self, trial.x)
-        text = why[1] if abs(why[0]) < APART and stop.event == "grazing" else f"jumps at {self.jumps(trial.x)}"
-        return replace(stop, message=f"{stop.message}: {text}")
-
-    def jumps(self, x: Array) -> str:
-        """Return the conditions and times of the jumps that a solution crosses."""
-        found = crossing_places(self, x)
-        return ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
+        found = crossing_places(self, trial.x)
+        places = ", ".join(f"{name} at t = {place:.6g}" for name, place in zip(found.names, found.places))
+        return replace(stop, message=f"{stop.message}: jumps at {places}")
 
     def events(self) -> list[Event]:
         """Return those of the statement and, where the equations jump, of crossings that end."""

@@ -185,7 +185,7 @@ class MeshPolicy:
         try:
             done = correct(system, x, row, row @ x, newton, linearize=True)
             end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
-            system.check_jumps(end.x, state, settled=False)
+            system.check_jumps(end.x, state, False)
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
         before = here()

@@ -335,7 +335,8 @@ class Continuation:
                 length, accepted = arc.state.arclength + point.at, arc.state.accepted + 1
                 behind = dataclasses.replace(behind, arclength=length, accepted=accepted)
         if touch.jumps and behind is None:
-            return dataclasses.replace(point, stop=Stop(Reason.EVENT, "met grazing", event="grazing")), None
+            told = f"met grazing: {touch.text}, where the equations jump"
+            return dataclasses.replace(point, stop=Stop(Reason.EVENT, told, event="grazing")), None
         ends = arc.state.tangent, (behind or arc.trial.settled).tangent
         free = arc.state.system.free
         rates = [tangent[free.index(self.primary) - len(free)] for tangent in ends]

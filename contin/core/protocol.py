@@ -256,8 +256,8 @@ class Discretization(Equations, Protocol):
         """Return the `Stability` of a point of a kind with an index; at a special one, what vanishes there does not count."""
         return None
 
-    def crossed(self, x: Array) -> tuple[Any, Array]:
-        """Return the same with frozen outcomes where the solution x crosses jumps of the equations, and x."""
+    def crossed(self, x: Array, corners: bool = False) -> tuple[Any, Array]:
+        """Return the same with frozen outcomes where the solution x crosses jumps of the equations, or ``corners``; and x."""
         return self, x
 
     def check_jumps(self, x: Array, state: Any, settled: bool = True) -> None:

@@ -97,7 +97,7 @@ class Term(NamedTuple):
 
     P and R linear. ``inputs(x)`` are t, P u, states at the other end and parameters. ``rows`` takes values (K, count) to R f,
     ``weights`` is R^T. ``by_x`` is P^T, with sums over the points for the free parameters: it takes derivatives by the inputs
-    (K, columns) to those by x.
+    (K, columns) to those by x. ``moved`` takes a direction of x to P u and so on, where P depends on x.
     """
 
     system: System
@@ -106,6 +106,7 @@ class Term(NamedTuple):
     rows: Callable[[Array], Array]
     weights: Callable[[Array], Array]
     by_x: Callable[[Array], Array]
+    moved: Callable[[Array], Inputs] | None = None
 
     def values(self, x: Array) -> Array:
         """Return R f."""
@@ -142,7 +143,7 @@ class Term(NamedTuple):
 
     def _direction(self, v: Array) -> Array:
         """Return a direction of x as one of all inputs."""
-        _, states, other, _ = self.inputs(v)
+        _, states, other, _ = (self.moved or self.inputs)(v)
         return self.system._wide(v, np.concatenate([states, other], axis=1) if len(other) else states)
 
 

@@ -361,14 +361,13 @@ class PeriodicCollocation(OfCycles, Collocation):
         """Return the same with a crossing that leaves at an end of the period and comes in at the other, and the carrier."""
         if not error.at_end or self.order > 1 or self._pieces is None:
             return None
-        (at, sides), first, last = self._pieces, self.mesh[0], self.mesh[-1]
-        if min(at[0] - first, last - at[-1]) > ROUGH * (last - first) or (sides[0] != sides[-1]).any():
+        (at, sides), (first, last) = self._pieces, self.mesh[[0, -1]]
+        edge = 0 if at[0] - first < last - at[-1] else -1
+        if abs(at[edge] - self.mesh[edge]) > ROUGH * (last - first) or (sides[0] != sides[-1]).any():
             return None
-        if at[0] - first < last - at[-1]:
-            pieces = np.append(at[1:], last - (at[0] - first)), sides[[*range(1, len(sides)), 1]]
-        else:
-            pieces = np.append(first + last - at[-1], at[:-1]), sides[[-2, *range(len(sides) - 1)]]
-        return self.with_pieces(pieces).on_mesh(moved_to_breaks(self.mesh, np.union1d(pieces[0], self.breaks)))
+        places, ring = np.sort([*np.delete(at, edge), first + last - at[edge]]), np.roll(sides[1:], -1 - 2 * edge, axis=0)
+        system = self.with_pieces((places, np.concatenate([ring[-1:], ring])))
+        return system.on_mesh(moved_to_breaks(self.mesh, np.union1d(places, self.breaks)))
 
 
 class ForcedCollocation(PeriodicCollocation):
@@ -566,14 +565,14 @@ class CycleCollocation(PeriodicCollocation):
             self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 
-    def crossed(self, x: Array) -> tuple[CycleCollocation, Array]:
+    def crossed(self, x: Array, corners: bool = False) -> tuple[CycleCollocation, Array]:
         """Return the same with frozen outcomes where a cycle crosses jumps, and the cycle begun far from all of them."""
         if not self.outcomes.size and self.switching(x).jumps.any():
             places = np.append(0.0, self.switching(x).places)  # one at the ends is not seen
             gaps = np.diff(places, append=places[0] + 1)
             shift = float((places + gaps / 2)[gaps.argmax()])
             return super(CycleCollocation, self.with_reference(self.moved(x, shift))).crossed(self.moved(x, shift))
-        return super().crossed(x)
+        return super().crossed(x, corners)
 
     # --- the reference -----------------------------------------------------------------------------------
 

@@ -231,8 +231,8 @@ class Defining(Discretization):
         size = self.base.size
         return np.append(self.base.lifted(x[:size], reference[:size]), x[size:])
 
-    states, evaluate, all_parameters, parameter, functionals, switching = map(
-        _of_the_base, ("states", "evaluate", "all_parameters", "parameter", "functionals", "switching")
+    states, evaluate, all_parameters, parameter, functionals, switching, check_jumps = map(
+        _of_the_base, ("states", "evaluate", "all_parameters", "parameter", "functionals", "switching", "check_jumps")
     )
     discretization_error, newton_error, cut_off_errors = map(
         _with_factors, ("discretization_error", "newton_error", "cut_off_errors")
@@ -264,6 +264,10 @@ class Defining(Discretization):
     def on_switches(self, x: Array, closely: bool = False) -> tuple[Defining, Carrier] | None:
         """Return the defining system on a mesh with those places among its points, and the carrier."""
         return self._moved(self.base.on_switches(self.inside(x), closely))
+
+    def round_end(self, x: Array, error: Exception) -> tuple[Defining, Carrier] | None:
+        """Return the defining system with a crossing that passes an end of the period, and the carrier."""
+        return self._moved(self.base.round_end(self.inside(x), error))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Defining, Carrier] | None:
         """Return the defining system on a better mesh, or with new borders where the old ones do not fit, and the carrier."""

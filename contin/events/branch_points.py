@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import contextlib
 import functools
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.labels import Label
 from contin.core.protocol import inner
+from contin.core.step import ROUNDS
 from contin.core.trial import Trial, same_sign, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
-from contin.events.branch_point import locate_branch_point
+from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
 from contin.events.multiple_point import MultiplePoint, locate_multiple_point
 from contin.levels import APART
@@ -173,12 +175,14 @@ class BranchPointSearch:
         middle = low + self._share * (high - low)
         for _ in range(_HALVINGS):
             try:
-                found = locate_branch_point(state.system, arc.guess(middle), arc.newton)
-                at = inner(state.system, state.tangent, found.x - state.x)
+                found, system = self._near(middle)
+                x = found.x if system is state.system else system.carrier(state.system)(found.x)
+                at = inner(state.system, state.tangent, x - state.x)
                 inside = arc.low - APART * step <= at <= step * (1 + APART)
-                if inside and found.gap < largest and arc.passes_by(found.x, at):
-                    found = found.along(state.system, arc.direction(at))
-                    return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(state.system, found.x), details=found)
+                if inside and found.gap < largest and arc.passes_by(x, at):
+                    direction = arc.direction(at) if system is state.system else state.system.carrier(system)(arc.direction(at))
+                    found = found.along(system, direction)
+                    return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(system, found.x), details=found)
             except ConvergenceError:
                 pass
             try:
@@ -188,6 +192,20 @@ class BranchPointSearch:
             low, high = (low, middle) if changes else (middle, high)
             middle = (low + high) / 2
         return SpecialPoint(high, Label.BRANCH_POINT, "", trial, is_located=False)
+
+    def _near(self, at: float) -> tuple[BranchPoint, Any]:
+        """Return the branch point near a place and its system: where conditions switch, on a mesh with frozen outcomes."""
+        system, x = self.arc.state.system, self.arc.guess(at)
+        if system.outcomes.size or system.crossed(x, corners=True)[0].outcomes.size:
+            there = self.arc.at(at).settled
+            system, x = there.system.crossed(there.x, corners=True)
+        found = locate_branch_point(system, x, self.arc.newton)
+        for _ in range(ROUNDS if system.outcomes.size else 0):
+            if (moved := system.on_switches(found.x)) is None:
+                break
+            system, carry = moved
+            found = found.again(system, carry, found.x, self.arc.newton)
+        return found, system
 
     @functools.cached_property
     def multiple(self) -> SpecialPoint:

@@ -294,8 +294,10 @@ def coefficient(
 ) -> Coefficient:
     """Return the coefficient that `fold`, `flip` or `pair` has the terms of, at a solution x; NaN where it is infinite.
 
-    ``here`` is the form at x, if that is at hand.
+    ``here`` is the form at x, if that is at hand. It is not known where a solution crosses jumps or frozen corners.
     """
+    if system.outcomes.size:
+        return UNKNOWN
 
     def there(point: Array) -> Numbers:
         with np.errstate(all="ignore"):
@@ -310,7 +312,7 @@ def coefficient(
 
 def at_special_point(system: System, point: SpecialPoint) -> Coefficient | None:
     """Return the coefficient at a fold, or where one multiplier or pair is critical; None at other special points."""
-    terms = None if point.test is None else point.test.normal_form
+    terms = None if point.test is None or system.outcomes.size else point.test.normal_form
     if terms is fold:
         return coefficient(system, point.trial.x, fold) if point.details is None and point.is_located else None
     if terms is None or not point.is_simple:

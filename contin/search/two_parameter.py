@@ -392,9 +392,7 @@ def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hol
     """Return the defining system of the kind of a point; raise ProblemError if none can be followed."""
     system: Any = start.system
     base, x = system.with_free(names, start.x)
-    if base.outcomes.size:
-        jumps = f"start: the solution crosses jumps of the equations ({system.jumps(start.x)})"
-        raise ProblemError(f"{jumps}, which curves do not follow: trace it at several values of {names[-1]}")
+    base, x = base.crossed(x, corners=True)
     if event is not None:
         return _event(start, base, x, event)
     if hold is not None:

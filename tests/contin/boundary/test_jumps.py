@@ -147,14 +147,6 @@ def test_a_relay_and_its_multipliers():
         assert np.allclose(np.sort(np.exp(point.system.eigenvalues(point.x)).real), np.sort(multipliers), rtol=0, atol=1e-7)
 
 
-def test_curves_in_two_parameters_refuse_jumps():
-    names = {"a": 0.5, "b": 0.0}
-    problem = contin.BoundaryValueProblem(thresholds, lambda a, b, p: (a.x, b.x - 0.8 - p.b), ["x", "v"], names, domain=(0, 2))
-    point = contin.trace(contin.solve(problem, lambda t: (0.4 * t, 0.4)), free=["a"], limits={"a": (0.4, 0.6)})[-1]
-    with pytest.raises(contin.ProblemError, match="crosses jumps .*u.x > 0.3.* at t = "):
-        contin.curve(point, free=["a", "b"])
-
-
 def test_a_stored_cycle_keeps_its_multipliers(tmp_path):
     problem = contin.CycleProblem(welander, ["T", "S"], {"a": 1.2, "e": -0.01})
     branch = contin.trace(contin.cycle(problem, [0.5, 0.5]), free=["e", "period"], limits={"e": (-0.011, 0)}, max_points=3)
@@ -190,10 +182,14 @@ def relay(c, w, k, force):
         lambda t, u, p: (u.v, -u.x - c * u.v - k * (1.0 if u.x > 1 else 0.0) + p.F * np.cos(w * t)), ["x", "v"], {"F": force},
         period=2 * math.pi / w,
     )  # fmt: skip
+    return swinging(problem, c, w, force)
+
+
+def swinging(problem, c, w, force):
+    """Return the cycle without any switch, from that of the linear oscillator."""
     answer = force / (1 - w**2 + 1j * w * c)
-    return contin.solve(
-        problem, lambda t: ((answer * np.exp(2j * np.pi * t)).real, (1j * w * answer * np.exp(2j * np.pi * t)).real)
-    )
+    turned = [lambda t: (answer * np.exp(2j * np.pi * t)).real, lambda t: (1j * w * answer * np.exp(2j * np.pi * t)).real]
+    return contin.solve(problem, lambda t: (turned[0](t), turned[1](t)), {"F": force})
 
 
 def off_the_exact_cycle(point, c, w, k):
@@ -234,6 +230,55 @@ def test_a_relay_that_begins_to_switch(c, w, k, labels):
         for point in run.points[::4]:
             assert off_the_exact_cycle(point, c, w, k) < 1e-9
     assert back[-1]["max_x"] < 1 < branch[-1]["max_x"]
+
+
+@pytest.mark.parametrize(
+    ("c", "w", "label", "value", "range_"), [(0.3, 1.4, "LP", 1, (1.3, 1.5)), (0.1, 0.7, "PD", -1, (0.7, 0.72))]
+)
+def test_curves_in_two_parameters(c, w, label, value, range_):
+    """A multiplier along the curve, by exponentials of both pieces and the saltation matrices: 1 or -1."""
+    problem = contin.CycleProblem(
+        lambda t, u, p: (u.v, -u.x - c * u.v - 0.4 * (u.x > 1) + p.F * np.cos(p.w * t)), ["x", "v"], {"F": 0.4, "w": w},
+        period=lambda p: 2 * math.pi / p.w,
+    )  # fmt: skip
+    force = math.hypot(1 - w**2, c * w)
+    start = swinging(problem, c, w, 0.9 * force)
+    (point,) = contin.trace(start, free=["F"], limits={"F": (0.5 * force, 1.07 * force)}).labelled(label)
+    curve = contin.curve(point, "w", limits={"w": range_})
+    assert curve.stop.reason == "limit" and not curve.notes and len(curve) > 3
+    for each in curve:
+        system, x = each.system.solution, each.system.inside(each.x)
+        period, steady = 2 * math.pi / each["w"], np.array([[0, 1], [-1, -c]])
+        found, before, (first, last) = np.eye(2), 0.0, system.mesh[[at.node for at in system.crossings(x)]]
+        inside = system.evaluate(x, np.array([(first + last) / 2]))[0, 0] > 1
+        for time, sign in (first, 1 if inside else -1), (last, -1 if inside else 1):
+            speed = system.evaluate(x, np.array([time]))[0, 1]
+            found = np.array([[1, 0], [-0.4 * sign / speed, 1]]) @ expm(steady * period * (time - before)) @ found
+            before = time
+        found = expm(steady * period * (1 - before)) @ found
+        assert abs(np.linalg.eigvals(found) - value).min() < 1e-7
+
+
+def test_a_symmetry_breaks_between_two_stops():
+    """A branch point of x'' + .1 x' + x + 10 (what of |x| is above 1) = F cos .7 t; a multiplier of both pieces is 1."""
+
+    def field(t, u, p):
+        return u.v, -u.x - 0.1 * u.v - 10 * (max(u.x - 1, 0) + min(u.x + 1, 0)) + p.F * np.cos(0.7 * t)
+
+    problem = contin.CycleProblem(field, ["x", "v"], {"F": 0.5}, period=2 * math.pi / 0.7)
+    branch = contin.trace(swinging(problem, 0.1, 0.7, 0.5), free=["F"], limits={"F": (0.4, 0.525)})
+    (point,) = branch.labelled("BP")
+    assert not branch.notes and point.errors["F"] < 1e-9
+    system, period, found, before = point.system, 2 * math.pi / 0.7, np.eye(2), 0.0
+    times = [system.mesh[each.node] for each in system.crossings(point.x)]
+    for time in (*times, 1.0):
+        outside = abs(system.evaluate(point.x, np.array([(before + time) / 2]))[0, 0]) > 1
+        found = expm(np.array([[0, 1], [-11.0 if outside else -1.0, -0.1]]) * period * (time - before)) @ found
+        before = time
+    assert len(times) == 4 and abs(np.linalg.eigvals(found) - 1).min() < 1e-7
+    other = contin.trace(point, branch=1, max_points=4)[-1]
+    u = other.system.evaluate(other.x, np.linspace(0, 1, 500))[:, 0]
+    assert abs(u.max() + u.min()) > 1e-4
 
 
 def test_a_relay_that_would_slide():
