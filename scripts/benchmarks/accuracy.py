@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 from peers import auto_07p, scipy_small
@@ -59,13 +60,11 @@ def _exact_cycle() -> float:
         x, y, r = unknowns
 
         def rates(t, u):
-            a, b, c = u
-            return [10 * (b - a), r * a - b - a * c, a * b - 8 / 3 * c]
+            return field(SimpleNamespace(**dict(zip("xyz", u))), SimpleNamespace(r=r))
 
         end = solve_ivp(rates, (0, PERIOD), [x, y, r - 1], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
         return end - [x, y, r - 1]
 
-    assert field is not None
     return float(fsolve(missed, [10.504787, 13.783083, 14.25866], xtol=1e-13)[-1])
 
 

@@ -80,15 +80,14 @@ def study(
         circle = _run(program, folder, CONSTANTS.format(**values, **first))
         (folder / "fort.8").replace(folder / "fort.3")
         branch = _run(program, folder, CONSTANTS.format(**values, **second))
-    kappa = [row[0] for row in branch["trace"]]
     folds = [value for label, value in branch["labels"] if label == "LP"]
     ends = [value for label, value in branch["labels"] if label == "BP"]
     return {
         "seconds": branch["seconds"], "circle_seconds": circle["seconds"],
         "process_seconds": circle["process_seconds"] + branch["process_seconds"],
         "points": branch["points"], "iterations": branch["iterations"], "labels": branch["labels"],
-        "fold": min(kappa, key=lambda value: abs(value - folds[0])) if folds else None,
-        "end": min(kappa, key=lambda value: abs(value - ends[-1])) if ends else None,
+        "fold": in_full(branch, folds[0]) if folds else None,
+        "end": in_full(branch, ends[-1]) if ends else None,
         "circle": circle["labels"][-1][1],
     }  # fmt: skip
 
@@ -100,12 +99,12 @@ def bratu(intervals: int, degree: int, tolerance: float, longest_step: float) ->
               "longest_step": longest_step, "first_step": 0.1, "diagnostics": 0}  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="bench-auto-") as name:
         found = _run(build("bratu")[0], Path(name), CONSTANTS.format(**values))
-    return found | {"fold": in_full(found)}
+    return found | {"fold": in_full(found, found["labels"][-1][1])}
 
 
-def in_full(found: dict) -> float:
-    """Return the first free parameter at the last label of a run in full precision."""
-    return min((row[0] for row in found["trace"]), key=lambda value: abs(value - found["labels"][-1][1]))
+def in_full(found: dict, known: float) -> float:
+    """Return the first free parameter of a run in full precision where AUTO's own files have it with eleven digits."""
+    return min((row[0] for row in found["trace"]), key=lambda value: abs(value - known))
 
 
 def _run(program: Path, folder: Path, constants: str) -> dict:

@@ -103,4 +103,4 @@ def study(name: str, last: float, step: float, *, intervals: int, degree: int, t
         second = {"kind": 2, "restart": 2, "free": "1, 11", "step": 0.1, "longest_step": 0.5}
         stop = f"UZSTOP={{11: {last}}}"
         found = auto_07p._run(build(name), folder, CONSTANTS.format(**values, **second, stop=stop))
-    return found | {"parameter": auto_07p.in_full(found)}
+    return found | {"parameter": auto_07p.in_full(found, found["labels"][-1][1])}
