@@ -29,6 +29,9 @@ _FAR = 0.05
 #: On a mesh of half the width the error is 2^-(2 d) of what it was: a point that moves by more than this part of the move
 #: before does so by round-off.
 _CLOSER = 0.25
+#: The move to a mesh made for the tolerance tells of what is left by the order and the errors of both meshes, which know it
+#: within less than this factor.
+_SAFE = 8.0
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
 #: A value that is not below this part of the nearest to zero came no nearer. Ten times smaller, secants that still come nearer
@@ -75,7 +78,7 @@ _Found = tuple[Trial, Any, float]
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
-    One whose error is above that tolerance, as on a path that is less exact, is located on a mesh made for the tolerance first.
+    The first finer mesh of one whose error is above that tolerance, as on a path that is less exact, is made for the tolerance.
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
     is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
     and has no errors. Where halving the mesh no longer brings it much closer, it moves by round-off: its error is the larger of
@@ -87,17 +90,16 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     if finding_of(details).is_lost:
         return Refined(trial, errors, details, is_lost=True)
     try:
-        found = _on_switches(point, (trial, details, 0.0), settings.newton)
-        trial, details, left = _on_better_mesh(point, found, settings)
+        trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
     is_lost = False
-    for _ in range(_HALVINGS):
+    for number in range(_HALVINGS):
         coarse = trial.system
-        finer = coarse.refined()
-        system, carry = finer or (coarse, np.array)
+        made = None if number else _on_made_mesh(point, trial, details, settings)
+        finer = None if made else coarse.refined()
         try:
-            again = _again(point, trial, details, (system, carry), settings.newton)
+            again = made or _again(point, trial, details, finer or (coarse, np.array), settings.newton)
             better, found, left = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
@@ -105,45 +107,51 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         system = better.system
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
-        steps = np.maximum(steps, LAST_PLACES * size.max())
+        least = LAST_PLACES * size.max()
+        steps = np.maximum(steps * _part_left(trial, better) if made else steps, least)
         left = left + finding_of(found).round_off(system, settings.newton)
         moved = float(np.max(steps / size))
         if np.any(steps > _FAR * size):
             is_lost = last == np.inf
             break
-        settled = np.maximum(settings.mesh.tolerance * size, left) >= steps
+        settled = np.maximum(np.maximum(settings.mesh.tolerance * size, left), least) >= steps
         change = np.maximum(steps, before) if moved > _CLOSER * last else steps
         known = change + left + finding_of(found).split(system)  # a curve of branch points has one unknown more
         errors = dict(zip(system.free, map(float, known[: len(system.free)] * system.free_scales)))
-        if moved > last or finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
+        if moved > last or not (made or finer) or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
             break  # such a mesh serves the estimate only
-        before, last = steps, moved
         trial, details = better, found
-        if np.all(settled):
+        if np.all(settled) or moved > _CLOSER * last:
             break
+        before, last = steps, moved
     return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
 
 
-def _on_better_mesh(point: SpecialPoint, found: _Found, settings: Settings) -> _Found:
-    """Return a special point on a mesh of more intervals that is made for the tolerance; as it is where that does not serve.
+def _on_made_mesh(point: SpecialPoint, trial: Trial, details: object, settings: Settings) -> _Found | None:
+    """Return a special point on a mesh that is made for the tolerance, of twice as many intervals at least; None if not found.
 
-    Interpolation moves a point along the branch. Where no equation holds its place, the mesh is only halved.
+    Interpolation moves a point along the branch: there is none for those whose place no equation holds, and where the halved
+    mesh serves as well.
     """
-    (trial, details, _), test, control = found, point.test, settings.mesh
-    system = trial.system
+    test, control, system = point.test, settings.mesh, trial.system
     if test is None or finding_of(details).has_equations or not (system.intervals and np.isfinite(trial.tangent).all()):
-        return found
+        return None
     if not (test.holds_one_of(system.free) or trial.value(test)) or not trial.discretization_error > control.tolerance:
-        return found
-    fewest = min(system.intervals + 1, control.max_intervals)
-    made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=fewest))
-    if made is None or made[0].intervals <= system.intervals:
-        return found
+        return None
+    made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=min(2 * system.intervals, control.max_intervals)))
+    if made is None or made[0].intervals < 2 * system.intervals:
+        return None
     with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
-        there = _on_switches(point, _again(point, trial, details, made, settings.newton), settings.newton)
-        x = there[0].x[there[0].system.state_size :]
-        return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else found
-    return found
+        there = _again(point, trial, details, made, settings.newton)
+        x = there[0].x[made[0].state_size :]
+        return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else None
+    return None
+
+
+def _part_left(coarse: Trial, better: Trial) -> float:
+    """Return the part of a move to a better mesh that may be left there: _SAFE times what the order and both errors say."""
+    order = (coarse.system.intervals / better.system.intervals) ** (2 * coarse.system.degree)
+    return min(_SAFE * max(order, better.discretization_error / coarse.discretization_error), 1.0)
 
 
 def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, settings: Settings) -> dict[str, float]:

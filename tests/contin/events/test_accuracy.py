@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import contin
-from bank.closed_forms import bratu
+from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_mean
 from contin.core.newton import correct
 
 #: A layer of this width at t = c.
@@ -53,6 +53,18 @@ def test_points_between_labelled_ones_may_be_less_exact():
     assert 2 * np.mean([each.system.intervals for each in coarse]) < np.mean([each.system.intervals for each in fine])
     assert max(layer_error(point) for branch in both for point in branch if point.label) < 1e-11
     assert [point.label for point in both[0] if point.label] == ["EP", "UZ", "EP"]
+
+
+@pytest.mark.parametrize("path", [1e-5, 1e-8])
+def test_errors_of_labelled_points_on_a_path_that_is_less_exact(path):
+    """The fold of Bratu's problem, and loads where its mean has values that are asked for, are within their ±: closed forms."""
+    start, asked = contin.solve(bratu(), [0, 0], degree=4), [0.5, 2.0, 6.0, 12.0]
+    limits = {"lam": (-1, 4), "mean": (-1, 14)}
+    branch = contin.trace(start, free=["lam"], limits=limits, zeros={"mean": asked}, path_tolerance=path)
+    exact = [bratu_fold(), *(bratu_load(brentq(lambda s, m=mean: bratu_mean(s) - m, 1e-3, 50, xtol=1e-15)) for mean in asked)]
+    found = [*branch.labelled("LP"), *branch.labelled("UZ")]
+    for point, load in zip(found, exact, strict=True):
+        assert abs(point["lam"] - load) <= point.errors["lam"] + 1e-14 < 2e-12
 
 
 @pytest.mark.sample(2)
