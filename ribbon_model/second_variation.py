@@ -156,7 +156,7 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     tables = basis(degree)
     mesh = np.asarray(t)[::degree]
     quaternions = np.asarray(states)[:, :4]
-    local = quaternions[np.arange(len(mesh) - 1)[:, None] * degree + np.arange(degree + 1)]
+    local = quaternions[_places(len(mesh) - 1, degree)]
 
     def sample(at):
         j = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
@@ -171,6 +171,12 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     loads, inside = (axes @ moment, axes @ force), there[2:].reshape(*local.shape[:1], degree, 3, 3) @ axes.T
     known = {name: p[name] for name in law.parameters}
     return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, inside)
+
+
+@functools.cache
+def _places(intervals: int, degree: int) -> np.ndarray:
+    """Return the numbers of the nodes of each interval, (N, degree + 1)."""
+    return np.arange(intervals)[:, None] * degree + np.arange(degree + 1)
 
 
 def _whole(sample, first, last, length):
@@ -202,16 +208,15 @@ def _unfolded_cell(sample, first, last, length):
     normal /= np.linalg.norm(normal)
     axes = np.array([first[2], cross_matrix(normal) @ first[2], normal])
     axis = axes @ last[1]
-    half_turn = 2 * np.outer(axis, axis) - np.eye(3)
-    turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
     part, order = 2 * length, round(LENGTH / (2 * length))
-    winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
+    winding = math.atan2(2 * axis[0] * axis[1], 2 * axis[0] ** 2 - 1) * order / (2 * math.pi)
     if abs(order * part / LENGTH - 1) > levels.APART or abs(winding - round(winding)) > _WINDING_DEFECT:
         raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
-    signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]
 
     def directors(stations):
-        turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
+        half_turn = 2 * np.outer(axis, axis) - np.eye(3)
+        turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
+        turns, signs = [np.linalg.matrix_power(turn, k).T for k in range(order)], np.array([np.ones(3), _HALF_TURN])[:, :, None]
         s = np.mod(stations, LENGTH)
         number = np.minimum((s / part).astype(int), order - 1)
         s = np.clip(s - number * part, 0, part)

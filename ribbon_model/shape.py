@@ -102,6 +102,11 @@ class Shape:
         return Shape(*map(np.concatenate, pairs))
 
 
+#: What takes the products q_i q_j (16,) to the nine components of the directors: quadratic forms of q, by polarization.
+_SUMS, _OTHERS = (directors(*(np.repeat(np.eye(4), 4, axis=1) + sign * np.tile(np.eye(4), 4))) for sign in (1, -1))
+_DIRECTORS = np.subtract(_SUMS, _OTHERS).T / 4
+
+
 def frames(states) -> np.ndarray:
     """Return the directors (K, 3, 3), rows d1, d2, d3 on the lab axes, from states (K, >= 4) that begin with the quaternion.
 
@@ -110,8 +115,9 @@ def frames(states) -> np.ndarray:
     >>> frames(np.array([[1.0, 0.0, 0.0, 0.0]]))[0].tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    q = np.asarray(states)[:, :4].T
-    return np.array(directors(*q)).T.reshape(-1, 3, 3) / np.sum(q * q, axis=0)[:, None, None]
+    q = np.asarray(states)[:, :4]
+    products = (q[:, :, None] * q[:, None]).reshape(-1, 16)
+    return (products @ _DIRECTORS).reshape(-1, 3, 3) / products[:, ::5].sum(axis=1)[:, None, None]
 
 
 def quaternions(directors) -> np.ndarray:

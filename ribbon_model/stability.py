@@ -32,6 +32,7 @@ Steps:
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,8 +45,8 @@ from ribbon_model.second_variation import Equilibrium, Symmetry, coupling, cross
 _DEFINITE = 0.2
 #: Rigid motions, and components of E.
 _RIGID = 6
-#: Matrices (3, 3) of the products with the axes: a x for a = sum of a_i e_i is their sum.
-_CROSS = np.array([cross_matrix(axis) for axis in np.eye(3)])
+#: Matrices (3, 3), as rows of 9, of the products with the axes: a x for a = sum of a_i e_i is their sum.
+_CROSS = np.array([cross_matrix(axis).ravel() for axis in np.eye(3)])
 
 
 @dataclass(frozen=True)
@@ -143,15 +144,11 @@ def index(equilibrium: Equilibrium) -> Stability:
     form = _Form(equilibrium, points)
     classes = form.classes()
     floor = max(levels.LOCATED, form.residual)
-    reasons = []
-    if points.gap > levels.APART:
-        reasons.append(f"the loop is not closed: a gap of {points.gap:.1e}")
-    for entry in classes:
-        nearest = entry.eigenvalues[entry.nearest]
-        if abs(nearest) <= floor:
-            label = f"class {entry.wavenumber} {entry.parity}".strip()
-            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be distinguished from zero")
-    total = sum(entry.multiplicity * entry.negative for entry in classes)
+    reasons = [f"the loop is not closed: a gap of {points.gap:.1e}"] if points.gap > levels.APART else []
+    for entry in (classes[number] for number in np.flatnonzero(np.abs(form.eigenvalues).min(axis=1) <= floor)):
+        label, nearest = f"class {entry.wavenumber} {entry.parity}".strip(), entry.eigenvalues[entry.nearest]
+        reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be distinguished from zero")
+    total = int((_kinds(equilibrium.symmetry)[2] * (form.eigenvalues < 0)).sum())
     return Stability(total, not reasons, "; ".join(reasons), form.residual, points.gap, classes)
 
 
@@ -175,28 +172,29 @@ class _Points:
 def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     """Return the fields of an equilibrium at the Gauss points; the centreline is by the collocation's own quadrature."""
     tables, mesh = basis(equilibrium.degree), equilibrium.mesh
-    lengths, d = np.diff(mesh), equilibrium.inside
+    lengths, d = mesh[1:] - mesh[:-1], equilibrium.inside
     if d is None:
         stations = mesh[:-1, None] + lengths[:, None] * tables.points
         d = equilibrium.directors(stations.ravel()).reshape(*stations.shape, 3, 3)
-    ends = np.cumsum(lengths[:, None] * np.einsum("i,eik->ek", tables.weights, d[:, :, 2]), axis=0)
-    inside = lengths[:, None, None] * np.einsum("ij,ejk->eik", tables.runge_kutta, d[:, :, 2])
+    inside, whole = (lengths[:, None, None] * (rule @ d[:, :, 2]) for rule in (tables.runge_kutta, tables.weights[None]))
+    ends = np.cumsum(whole[:, 0], axis=0)
     inside[1:] += ends[:-1, None]
     origin, gap = _origin(equilibrium.symmetry, ends[-1])
     shape, x, d = inside.shape[:2], (inside + origin).reshape(-1, 3), d.reshape(-1, 3, 3)
     about = cross_matrix(equilibrium.force)
     momentum = equilibrium.moment - about @ origin
-    moment = np.einsum("kij,kj->ki", d, momentum + x @ about.T)
+    moment = (d @ (momentum + x @ about.T)[:, :, None])[:, :, 0]
     strain, compliance = equilibrium.response(moment)
-    free = equilibrium.law.free
+    free = slice(0, 3, 2 if equilibrium.law.constrained else 1)
     try:
-        factor = np.linalg.cholesky(compliance[:, free][:, :, free])
+        factor = np.linalg.cholesky(compliance[:, free, free])
     except np.linalg.LinAlgError as error:
         raise ValueError("the energy is not convex in the strains along this equilibrium: it has no index") from error
     u = d[:, free].transpose(0, 2, 1) @ factor
-    generator = np.concatenate([u, -np.tensordot(x, _CROSS, 1) @ u], axis=1)
-    rate = (np.tensordot(moment, _CROSS, 1) @ strain[:, :, None])[:, :, 0] + d @ equilibrium.force @ _CROSS[2]  # M'
-    motion = np.einsum("kab,ka->kb", factor, rate[:, free])
+    crossed, turned = (np.concatenate([-x, moment]) @ _CROSS).reshape(2, -1, 3, 3)
+    generator = np.concatenate([u, crossed @ u], axis=1)
+    rate = (turned @ strain[:, :, None])[:, :, 0] + d @ equilibrium.force @ _CROSS[2].reshape(3, 3)  # M'
+    motion = rate[:, None, free] @ factor
     return _Points(lengths, generator.reshape(*shape, 6, -1), motion.reshape(*shape, -1), momentum, gap)
 
 
@@ -204,17 +202,17 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
     """Return x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
     if not symmetry.reverses:
         return np.zeros(3), float(np.linalg.norm(end))
-    rows, inverse = _centring(symmetry)
-    values = rows[3:] @ end
-    origin = -inverse @ values
-    return origin, float(np.linalg.norm([rows[:3] @ origin, rows[3:] @ origin + values]))
+    centring, left = _centring(symmetry)
+    return centring @ end, math.hypot(*(left @ end))
 
 
 @functools.cache
 def _centring(symmetry: Symmetry) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows (6, 3) that vanish on x at both ends of the piece, and what takes values of the last three to x(0)."""
+    """Return what takes x(end) - x(0) of the piece to x(0), (3, 3), and to what should vanish then at both ends, (6, 3)."""
     rows = np.vstack([np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry))])
-    return rows, np.linalg.pinv(rows, rcond=levels.DEPENDENT)[:, 3:]
+    at_end = np.vstack([np.zeros((3, 3)), rows[3:]])
+    centring = -np.linalg.pinv(rows, rcond=levels.DEPENDENT) @ at_end
+    return centring, rows @ centring + at_end
 
 
 # --- symmetry -----------------------------------------------------------------------------------------------------------
@@ -264,22 +262,28 @@ def _closing(symmetry: Symmetry) -> tuple[np.ndarray, np.ndarray]:
     return _CIRCULAR.conj().T @ (inverse[:, :, None] * _CIRCULAR), rows
 
 
-#: Kinds of unknowns of a part of the loop: those with one sign under the reversal, with the other one, or both.
-_FIRST, _SECOND, _BOTH = range(3)
+@functools.cache
+def _kinds(symmetry: Symmetry) -> tuple[list[tuple[int, str]], np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return names, wavenumbers (K,), multiplicities (K, 1) and unknowns (K, 2), and the class of the shift of phase.
+
+    Unknowns are 1 where values with one sign under the reversal, and with the other one, are unknowns of the class. All values
+    are of the first kind where nothing reverses the loop.
+    """
+    kinds: dict[tuple[int, str], tuple[float, float]] = {}
+    for j in range(symmetry.order // 2 + 1):
+        if not symmetry.reverses or 2 * j % symmetry.order:
+            kinds[j, ""] = 1.0, float(symmetry.reverses)
+        else:
+            kinds[j, "even"], kinds[j, "odd"] = ((1.0, 0.0), (0.0, 1.0)) if j == 0 else ((0.0, 1.0), (1.0, 0.0))
+    unknowns, names = np.array(list(kinds.values())), list(kinds)
+    shift = names.index((0, "odd" if symmetry.reverses else ""))
+    return names, np.array([j for j, _ in names]), unknowns.sum(axis=1, keepdims=True).astype(int), unknowns, shift
 
 
 @functools.cache
-def _kinds(symmetry: Symmetry) -> dict[tuple[int, str], int]:
-    """Return the kind of unknowns of each class, by its name: all are of the first one where nothing reverses the loop."""
-    kinds = {}
-    for j in range(symmetry.order // 2 + 1):
-        if not symmetry.reverses:
-            kinds[j, ""] = _FIRST
-        elif 2 * j % symmetry.order:
-            kinds[j, ""] = _BOTH
-        else:
-            kinds[j, "even"], kinds[j, "odd"] = (_FIRST, _SECOND) if j == 0 else (_SECOND, _FIRST)
-    return kinds
+def _couplings(symmetry: Symmetry) -> np.ndarray:
+    """Return what takes mu and R, (6,), to N as one row: those parts of it that have the symmetry of the loop, (6, 36)."""
+    return np.array([_symmetric(coupling(axis[:3], axis[3:]), symmetry).ravel() for axis in np.eye(6)])
 
 
 def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
@@ -323,11 +327,14 @@ def _on_interval(degree: int, controls: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 class _Form:
-    """The second variation on the piece: its matrix and W (6, n), for n unknowns; ``residual`` is Q of the shift of phase."""
+    """The second variation on the piece: its matrix and W (6, n), for n unknowns.
+
+    ``eigenvalues`` (K, m) are those of the K classes; ``residual`` is Q of the shift of phase.
+    """
 
     def __init__(self, equilibrium: Equilibrium, points: _Points):
-        self.symmetry, self.residual = equilibrium.symmetry, 0.0
-        self.coupling = _symmetric(coupling(points.momentum, equilibrium.force), self.symmetry)
+        self.symmetry = equilibrium.symmetry
+        self.coupling = (np.append(points.momentum, equilibrium.force) @ _couplings(self.symmetry)).reshape(6, 6)
         forms, increments, motion, size = _of_mesh(points, self.coupling, equilibrium.degree)
         sizes, work = np.full(len(forms), size), np.empty((2, *forms.shape[1:]))
         count = condense_forms(forms, increments, motion, self.coupling, _DEFINITE, sizes, work)
@@ -341,20 +348,15 @@ class _Form:
             first += size
 
     def classes(self) -> tuple[SymmetryClass, ...]:
-        """Return every class; set ``residual``."""
-        n, (forms, rows), kinds = len(self.motion), self._parts(), _kinds(self.symmetry)
-        unknowns, found = (slice(0, n), slice(n, 2 * n), slice(0, 2 * n)), dict[tuple[int, str], np.ndarray]()
-        for some in ([name for name in kinds if (kinds[name] == _BOTH) == both] for both in (False, True)):
-            if some:
-                parts = [(j, unknowns[kinds[j, parity]]) for j, parity in some]
-                known = np.zeros((len(some), len(rows[0, 0, parts[0][1]])))
-                for shift, (j, parity) in zip(known, some):
-                    shift += self.motion if j == 0 and parity != "even" else 0.0
-                given = np.array([forms[j, part, part] for j, part in parts]), np.array([rows[j, :, part] for j, part in parts])
-                values, residual = _spectra(*given, known)
-                found |= zip(some, values)
-                self.residual = max(self.residual, residual)
-        return tuple(SymmetryClass(*name, 2 if kinds[name] == _BOTH else 1, found[name]) for name in kinds)
+        """Return every class; set ``eigenvalues`` and ``residual``. Unknowns that a class has not are projected out."""
+        (names, wavenumbers, multiplicities, unknowns, shift), (forms, rows) = _kinds(self.symmetry), self._parts()
+        used, known = np.repeat(unknowns, len(self.motion), axis=1)[:, : len(forms[0])], np.zeros(len(forms[0]))
+        known[used[shift] > 0] = self.motion
+        forms = forms[wavenumbers] * used[:, :, None] * used[:, None]
+        forms.reshape(len(forms), -1)[:, :: used.shape[1] + 1] += 1 - used  # their diagonals
+        self.eigenvalues, self.residual = _spectra(forms, rows[wavenumbers] * used[:, None], known, shift)
+        found = zip(names, multiplicities[:, 0].tolist(), self.eigenvalues)
+        return tuple(SymmetryClass(*name, multiplicity, values) for name, multiplicity, values in found)
 
     def _parts(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the matrices of all wavenumbers on a part of the loop (J, m, m), and their conditions of closure (J, c, m).
@@ -368,23 +370,23 @@ class _Form:
             across, reflected = increments.T @ (self.coupling @ image) @ increments / 2, image @ increments
             form = np.zeros((2 * n, 2 * n))
             form[:n, :n], form[n:, n:] = self.matrix + across, self.matrix - across
-            increments = np.hstack([increments + reflected, 1j * (increments - reflected)]) * np.sqrt(0.5)
+            increments = np.concatenate([increments + reflected, 1j * (increments - reflected)], axis=1) * np.sqrt(0.5)
         closing = closing.conj().transpose(0, 2, 1) @ self.coupling
         forms = form + (increments.conj().T @ ((closing + closing.conj().transpose(0, 2, 1)) / 2) @ increments).real
         conditions = rows @ increments
         return forms, np.concatenate([conditions.real, conditions.imag], axis=1)
 
 
-def _spectra(forms, rows, known) -> tuple[np.ndarray, float]:
-    """Return eigenvalues (K, n) of forms under conditions (K, c, n), without known zeros (K, n), and the largest |Q| there."""
+def _spectra(forms, rows, known, shift: int) -> tuple[np.ndarray, float]:
+    """Return eigenvalues (K, n) of forms under conditions (K, c, n), without one's known zero (n,), and |Q| there."""
     _, sizes, out = np.linalg.svd(rows, full_matrices=False)
-    out = out * (sizes > levels.DEPENDENT)[:, :, None]
-    known = known - (known[:, None] @ out.transpose(0, 2, 1) @ out)[:, 0]
-    size = np.sqrt((known * known).sum(axis=1, keepdims=True))
-    known = np.where(size > levels.DOUBLED, known / np.maximum(size, levels.DOUBLED), 0.0)[:, None]
-    residual = float(np.abs(known @ forms @ known.transpose(0, 2, 1)).max())
-    out = np.concatenate([out, known], axis=1)  # between the projectors, and the identity on what they project out
-    image = forms @ out.transpose(0, 2, 1)
-    crossed = image @ out
-    within = out.transpose(0, 2, 1) @ (out @ image + np.eye(out.shape[1])) @ out
-    return np.linalg.eigvalsh(forms - crossed - crossed.transpose(0, 2, 1) + within), residual
+    out = np.concatenate([out * (sizes > levels.DEPENDENT)[:, :, None], np.zeros((len(forms), 1, len(known)))], axis=1)
+    known = known - out[shift].T @ (out[shift] @ known)
+    size = math.sqrt(known @ known)
+    if size > levels.DOUBLED:
+        out[shift, -1] = known / size
+    residual = float(abs(out[shift, -1] @ forms[shift] @ out[shift, -1]))
+    across = out.transpose(0, 2, 1)
+    image = forms @ across  # between the projectors, and the identity on what they project out
+    crossed = (image - across @ ((out @ image + np.eye(out.shape[1])) / 2)) @ out
+    return np.linalg.eigvalsh(forms - crossed - crossed.transpose(0, 2, 1)), residual

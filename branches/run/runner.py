@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from branches.run.display import Display
 from branches.scene.fields import ConfigError, Scene
@@ -104,6 +105,10 @@ def whole_branch(scene: Scene, path: Path, display: Display) -> None:
         raise KeyboardInterrupt
 
 
+#: More threads only slow down matrices as small as those of the index, and change their bits.
+_one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
+
+
 @dataclasses.dataclass
 class _Begun:
     """A run that has begun: all stages, the run of the present one, labelled points by stage, image of an unfinished file."""
@@ -114,6 +119,7 @@ class _Begun:
     image: bytes | None = None
 
 
+@_one_thread
 def _begun(scene: Scene, path: Path | None) -> _Begun:
     """Return the run of a scene from its first point, or the one that goes on with the unfinished file at ``path``."""
     stages = stages_of(scene)
@@ -136,6 +142,7 @@ def _begun(scene: Scene, path: Path | None) -> _Begun:
     return _Begun(stages, stage.resume(state, first, labelled), labelled, image)
 
 
+@_one_thread
 def _followed(begun: _Begun, path: Path | None, display: Display, interruption: Interruption):
     """Follow the stages of a run into a file; return the outcome, the reason to stop, and the writer."""
     stages, run, labelled = begun.stages, begun.run, begun.labelled

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from branches.scene.columns import Change
 from branches.scene.stage import Watch
@@ -47,9 +46,8 @@ class SymmetryWatch(Watch):
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
-        self._blas, self._from_circle = ThreadpoolController(), from_circle
+        self._from_circle, self._margin = from_circle, margin(law)
         self._known: dict = {}
-        self._margin = margin(law)
         self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
         self._step: tuple = None, None, set()  # both ends of the last one, and what may pass zero inside
         self._names = {entry.name for entry in self.at(system, x).classes}
@@ -67,7 +65,7 @@ class SymmetryWatch(Watch):
 
     def _resolved(self, system, x, point) -> Stability:
         """Return the stability on the system's mesh, or on a finer one if the known zero of a point is not small."""
-        result = self._evaluated(system, x)
+        result = Solution.at(system, x).index()
         if point is None or result.residual <= levels.APART or np.abs(system.residual(x)).max() > levels.APART:
             return result
         tangent = point.tangent
@@ -79,15 +77,10 @@ class SymmetryWatch(Watch):
                 x = correct(system, x, row, row @ x).x
             except ConvergenceError:
                 break
-            result = self._evaluated(system, x)
+            result = Solution.at(system, x).index()
             if result.residual <= levels.APART:
                 break
         return result
-
-    def _evaluated(self, system, x) -> Stability:
-        """Return the stability on the system's mesh."""
-        with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-            return Solution.at(system, x).index()
 
     def _within_law(self, system, x, point) -> Stability | None:
         """Return the stability of a state; None where the energy is not convex and there is no index."""
