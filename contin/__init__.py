@@ -11,7 +11,7 @@
 The tutorial is docs/contin.md; docs/architecture.md says which folder does what.
 """
 
-import importlib
+import importlib.util
 import operator
 import sys
 from typing import Any
@@ -35,6 +35,8 @@ def __getattr__(name: str) -> Any:
     try:
         return _public(name)
     except AttributeError:
+        if importlib.util.find_spec(f"{__name__}.{name}"):
+            raise  # an import of this module asks before it loads it
         moved = (f"{module}.{name}" for module in _MOVED if name in importlib.import_module(f"contin.{module}").__all__)
         place = _RENAMED.get(name) or next(moved, None)
         if place is None:

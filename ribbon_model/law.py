@@ -98,7 +98,7 @@ class Circle(NamedTuple):
     twisting: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Law:
     """A material law.
 

@@ -68,7 +68,7 @@ class Symmetry:
         return self.mirror or self.axis
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Equilibrium:
     """A closed equilibrium, B = 1, L = 2 pi.
 

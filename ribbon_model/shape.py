@@ -12,7 +12,7 @@ from contin.lowlevel import basis, interpolation, shown
 from ribbon_model.equilibrium import directors
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shape:
     """A strip in space, or a part of it.
 

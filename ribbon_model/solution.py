@@ -18,7 +18,7 @@ from ribbon_model.shape import Shape, frames, interpolated, quadrature_centrelin
 from ribbon_model.stability import Stability
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """An equilibrium of a closed strip, on the domain that it was computed on; B = 1, L = 2 pi.
 

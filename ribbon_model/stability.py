@@ -49,7 +49,7 @@ _RIGID = 6
 _CROSS = np.array([cross_matrix(axis).ravel() for axis in np.eye(3)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SymmetryClass:
     """Perturbations of one kind under the symmetry of the loop.
 
@@ -96,7 +96,7 @@ class SymmetryClass:
         return int(np.argmin(np.abs(self.eigenvalues)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stability:
     """Result of `index`.
 
@@ -155,7 +155,7 @@ def index(equilibrium: Equilibrium) -> Stability:
 # --- fields at the Gauss points -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Points:
     """Fields at the Gauss points of the piece, shapes (N, d, ...), lengths (N,) of the intervals, and the gap of the loop.
 

@@ -65,7 +65,7 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
     return outcome
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Computed:
     """A branch that was computed in memory; ``image`` is that of its file, the rest as in `branches.read.StoredBranch`."""
 
@@ -109,7 +109,7 @@ def whole_branch(scene: Scene, path: Path, display: Display) -> None:
 _one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(eq=False, repr=False)
 class _Begun:
     """A run that has begun: all stages, the run of the present one, labelled points by stage, image of an unfinished file."""
 

@@ -77,7 +77,7 @@ class Change:
     breaks: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Column:
     """A column of results.
 
@@ -170,7 +170,7 @@ _INDEX = (
 OWN = (*(one.name for one in (*_BOOK, *_INDEX)), "energy", "stage")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Columns:
     """All columns of a result, in the order of its tables: book-keeping, values, the index."""
 

@@ -62,6 +62,7 @@ def run(main: Callable[[], int]) -> int:
     Compiled code of other libraries may make another error of Ctrl-C: what comes after it is the interruption.
     """
     gc.set_threshold(_OBJECTS)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it reads all installed packages to find any
     try:
         return main()
     except (Exception, KeyboardInterrupt) as error:

@@ -329,7 +329,7 @@ def _shape(function: Function, signature: Signature, size: int) -> int:
 Quantity = float | str | Function
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Segment(checks.Named):
     """One interval of a `SegmentedProblem`, with its own equations.
 

@@ -19,7 +19,7 @@ DEGREES = range(2, 9)
 Degree = Annotated[int, Within(DEGREES[0], DEGREES[-1])]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Basis:
     """Tables of one degree d on the unit interval.
 

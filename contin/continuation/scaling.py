@@ -95,7 +95,7 @@ def scaled(
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Mode:
     """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order.
 

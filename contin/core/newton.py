@@ -58,7 +58,7 @@ class Newton(checks.Named):
         checks.fields(self)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Corrected:
     """A corrected point.
 

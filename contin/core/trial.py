@@ -18,7 +18,7 @@ from contin.linalg.blocks import Factors
 from contin.text import shown
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linearization:
     """The tangent of a curve at a point, and the factored matrix [F_x; row] right there that it came from.
 
@@ -172,7 +172,7 @@ class Trial:
         return self.system.parameter(self.x, name)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Event(checks.Named):
     """A function of a trial point whose zeros are special points.
 

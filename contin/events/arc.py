@@ -162,7 +162,7 @@ LEAST_COSINE = 0.1
 Place = tuple[float, Trial]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SpecialPoint:
     """A point located inside a step.
 

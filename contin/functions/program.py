@@ -37,7 +37,7 @@ CODES: dict[str, int] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inputs:
     """Where the inputs of a program are found: by slot, the column of u, of v, or of p. The slot of t is `TIME`."""
 
@@ -46,7 +46,7 @@ class Inputs:
     p: Mapping[Hashable, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
     """Instructions, and what they need.
 

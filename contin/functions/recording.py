@@ -136,7 +136,7 @@ def recorded_paths(tape: Tape, function: Function, call: Callable[[Any], Sequenc
         tape.decide = before
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class _Paths:
     """The paths through the decisions of a function, of which a ``call`` returns the values."""
 
