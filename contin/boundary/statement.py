@@ -21,7 +21,6 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array, Function, Named, Places
-from contin.boundary.fields import Fields
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import usual_degree
 from contin.core.system import Scales
@@ -32,7 +31,6 @@ from contin.events.labelled import Stability
 from contin.functions.batch import Batch
 from contin.functions.recording import result_count
 from contin.functions.signature import Arguments, Signature, argument_count, named_values
-from contin.problems.rewriting import of_parameters
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement, portable
 from contin.text import shown
 
@@ -128,7 +126,11 @@ class BoundaryValueProblem(Restated):
         degree: int = 0,
     ) -> Collocation:  # fmt: skip
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
-        return (Fields if self.rates else Collocation)(self, mesh, degree, free, parameters, scales)
+        if not self.rates:
+            return Collocation(self, mesh, degree, free, parameters, scales)
+        from contin.boundary.fields import Fields  # Hopf points and their curves, which solutions without rates have not
+
+        return Fields(self, mesh, degree, free, parameters, scales)
 
     def whole_guess(self, guess: object, parameters: Mapping[str, float]) -> Any:
         """Return a guess of all states for one that a user gives."""
@@ -506,6 +508,8 @@ class SegmentedProblem(InSegments, BoundaryValueProblem):
 
 def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:
     """Return the segments, checked, with lengths and beginnings as functions."""
+    from contin.problems.rewriting import of_parameters  # problems without segments do not need it
+
     pieces: list[Piece] = []
     for number, segment in enumerate(segments):
         what = f"segments: {number}: "

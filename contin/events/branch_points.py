@@ -21,7 +21,6 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
-from contin.events.multiple_point import MultiplePoint, locate_multiple_point
 from contin.levels import APART
 from contin.linalg.blocks import Factors
 from contin.linalg.border import smallest_directions
@@ -210,6 +209,8 @@ class BranchPointSearch:
     @functools.cached_property
     def multiple(self) -> SpecialPoint:
         """The multiple point inside the step, where several singular values vanish together; "possible" where they do not."""
+        from contin.events.multiple_point import MultiplePoint, locate_multiple_point  # most branches have none
+
         arc = self.arc
         state, step = arc.state, arc.step
         count, middle = self.count[0], arc.low + self._share * (step - arc.low)

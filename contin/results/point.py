@@ -11,7 +11,6 @@ import numpy as np
 
 from contin import errors as checks
 from contin.arrays import Array
-from contin.boundary.second_variation import SecondVariation, second_variation
 from contin.core.labels import Label
 from contin.core.protocol import Discretization
 from contin.core.trial import Trial
@@ -21,10 +20,10 @@ from contin.events.phase_loads import phase_loads
 from contin.problems.statement import PERIOD
 from contin.results.marks import Axes, point_to_html
 from contin.results.record import Profile, Record
-from contin.results.sensitivity import sensitivities
 from contin.text import COLUMNS, meant
 
 if TYPE_CHECKING:
+    from contin.boundary.second_variation import SecondVariation
     from contin.cycles.floquet import Floquet
     from contin.results.phase_response import PhaseResponse
     from contin.results.spectrum import Spectrum
@@ -234,6 +233,8 @@ class Point(Record):
         >>> {name: round(value["a"], 6) for name, value in fold.sensitivities().items()}
         {'b': 1.0}
         """
+        from contin.results.sensitivity import sensitivities  # as `floquet`
+
         checks.instance("point", self, Point, "a Point")  # of `contin.sensitivities`, as it was called in version 0.2
         return sensitivities(self, by, held)
 
@@ -423,6 +424,8 @@ class Point(Record):
             loaded = getattr(self.system.problem, "variation", None) is not None
             why = "its loads have no energy, so there is no index" if loaded else "it has no energy; state a VariationalProblem"
             raise ProblemError(f"second_variation: the problem cannot have one: {why}")
+        from contin.boundary.second_variation import second_variation  # as `floquet`
+
         found = second_variation(self.system, self.x)  # type: ignore[arg-type]
         if found is None:
             raise ProblemError("second_variation: the energy is not convex in the controls there (Legendre's condition)")
