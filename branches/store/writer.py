@@ -111,8 +111,7 @@ class BranchWriter:
             self.count = 0 if image is None else self._rewind()
         self._file.attrs["config"] = dump(first.scene)
         self.note(str(self._file.attrs.get("notes", "")).splitlines())
-        # reading the columns from HDF5 for each row would take longer than computing the row
-        self._types = {table: self._file[table].dtype for table in ("points", "events")}
+        self._rows: dict[str, np.ndarray] = {table: self._file[table][:] for table in self._tables}
         self._saved = time.monotonic()
         self._spent = 0.0
 
@@ -132,8 +131,8 @@ class BranchWriter:
         self.notes = list(dict.fromkeys([*self.notes, *texts]))
 
     def due(self) -> bool:
-        """Return whether a checkpoint is due: checkpoints take at most a tenth of the run's time."""
-        return time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
+        """Return whether a checkpoint is due: on a disk, and they take at most a tenth of the run's time."""
+        return self.path is not None and time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
 
     def checkpoint(self, start, status: str, stop: Stop | None = None) -> None:
         """Write all points so far, and the state for a resumed run, whose first point ``start`` is (system, x, tangent).
@@ -161,18 +160,22 @@ class BranchWriter:
 
     def points(self) -> np.ndarray:
         """Return the rows of points written so far."""
-        return self._file["points"][:]
+        return self._rows["points"]
 
     def events(self) -> np.ndarray:
         """Return the rows of labelled points written so far."""
-        return self._file["events"][:]
+        return self._rows["events"]
 
     def flush(self) -> None:
         """Move all points so far into the tables, in memory."""
         labelled = [row for row in self._buffer if row.point.label]
         for table, rows in (("points", self._buffer), ("events", labelled)):
-            values = [self._tables[table][name][2] for name in self._types[table].names]
-            _extend(self._file[table], np.array([tuple(value(row) for value in values) for row in rows], self._types[table]))
+            made = np.empty(len(rows), self._rows[table].dtype)
+            for name in made.dtype.names:
+                value = self._tables[table][name][2]
+                made[name] = [value(row) for row in rows]
+            _extend(self._file[table], made)
+            self._rows[table] = np.concatenate([self._rows[table], made])
         kept = [(row.point, row.number) for row in self._buffer if row.point.label or row.number % self._stride == 0]
         if kept:
             group, counts = self._file["solutions"], [len(point.system.nodes) for point, _ in kept]
@@ -216,7 +219,7 @@ class BranchWriter:
         index = solutions["index"][:]
         index = index[index["point"] < points]
         nodes = int(index["start"][-1] + index["count"][-1])
-        events = int(np.count_nonzero(self.events()["point"] < points))
+        events = int(np.count_nonzero(self._file["events"]["point"] < points))
         self._file["points"].resize(points, axis=0)
         self._file["events"].resize(events, axis=0)
         for name, rows in (("index", len(index)), ("t", nodes), ("states", nodes)):

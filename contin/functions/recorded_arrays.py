@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex, is_complex, part
@@ -92,7 +91,7 @@ def elementwise(function: Callable[..., Any], *inputs: object) -> Any:
     return _with_class(result)
 
 
-def _plain(value: object) -> NDArray[Any]:
+def _plain(value: object) -> np.ndarray[Any, Any]:
     """Return an array without our own class, so that NumPy's functions act on it as they are."""
     if isinstance(value, Numbers):
         return value.view(np.ndarray)
@@ -205,7 +204,7 @@ def ufunc_of_numbers(ufunc: np.ufunc, method: str, inputs: Sequence[object], opt
     raise Unrecordable(f"it calls {name}.{method}")
 
 
-def _stored(result: object, out: tuple[NDArray[Any], ...] | None = None, **_: object) -> Any:
+def _stored(result: object, out: tuple[np.ndarray[Any, Any], ...] | None = None, **_: object) -> Any:
     """Return the result, in the array ``out`` where one is given."""
     if not out:
         return result
