@@ -156,7 +156,7 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     tables = basis(degree)
     mesh = np.asarray(t)[::degree]
     quaternions = np.asarray(states)[:, :4]
-    local = quaternions[_places(len(mesh) - 1, degree)]
+    local = quaternions[np.arange(len(mesh) - 1)[:, None] * degree + np.arange(degree + 1)]
 
     def sample(at):
         j = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
@@ -171,12 +171,6 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
     loads, inside = (axes @ moment, axes @ force), there[2:].reshape(*local.shape[:1], degree, 3, 3) @ axes.T
     known = {name: p[name] for name in law.parameters}
     return Equilibrium(law, known, p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, inside)
-
-
-@functools.cache
-def _places(intervals: int, degree: int) -> np.ndarray:
-    """Return the numbers of the nodes of each interval, (N, degree + 1)."""
-    return np.arange(intervals)[:, None] * degree + np.arange(degree + 1)
 
 
 def _whole(sample, first, last, length):

@@ -34,6 +34,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,8 +50,7 @@ _RIGID = 6
 _CROSS = np.array([cross_matrix(axis).ravel() for axis in np.eye(3)])
 
 
-@dataclass(frozen=True, eq=False)
-class SymmetryClass:
+class SymmetryClass(NamedTuple):
     """Perturbations of one kind under the symmetry of the loop.
 
     Attributes
@@ -155,8 +155,7 @@ def index(equilibrium: Equilibrium) -> Stability:
 # --- fields at the Gauss points -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Points:
+class _Points(NamedTuple):
     """Fields at the Gauss points of the piece, shapes (N, d, ...), lengths (N,) of the intervals, and the gap of the loop.
 
     ``generator`` (N, d, 6, k) is G, ``motion`` (N, d, k) is C^T M', the shift of phase; ``momentum`` (3,) is mu.

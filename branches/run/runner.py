@@ -56,8 +56,9 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
             display.note(f"{path} is complete already ({done}); nothing to do")
             return "complete"
         prepare(path)
-        begun = _begun(scene, path if resume else None)
-        outcome, stop, writer = _followed(begun, path, display, Interruption())
+        with threadpool_limits(1, "blas"):  # more threads slow down matrices as small as the index's, and change their bits
+            begun = _begun(scene, path if resume else None)
+            outcome, stop, writer = _followed(begun, path, display, Interruption())
         with contextlib.closing(writer):
             display.summary(begun.stages, writer.events(), writer.count, time.perf_counter() - began, path, outcome, stop)
             for note in writer.notes:
@@ -90,7 +91,8 @@ class Computed:
 
 def compute_scene(scene: Scene, display: Display) -> Computed:
     """Return the branch of ``scene``; no file is written. Ctrl-C is not caught here: the points so far would be lost."""
-    outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
+    with threadpool_limits(1, "blas"):
+        outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""
         return Computed(writer.image(), outcome, str(stop or ""), reason, scene, writer.points(), writer.events(), writer.notes)
@@ -105,10 +107,6 @@ def whole_branch(scene: Scene, path: Path, display: Display) -> None:
         raise KeyboardInterrupt
 
 
-#: More threads only slow down matrices as small as those of the index, and change their bits.
-_one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
-
-
 @dataclasses.dataclass(eq=False, repr=False)
 class _Begun:
     """A run that has begun: all stages, the run of the present one, labelled points by stage, image of an unfinished file."""
@@ -119,7 +117,6 @@ class _Begun:
     image: bytes | None = None
 
 
-@_one_thread
 def _begun(scene: Scene, path: Path | None) -> _Begun:
     """Return the run of a scene from its first point, or the one that goes on with the unfinished file at ``path``."""
     stages = stages_of(scene)
@@ -142,7 +139,6 @@ def _begun(scene: Scene, path: Path | None) -> _Begun:
     return _Begun(stages, stage.resume(state, first, labelled), labelled, image)
 
 
-@_one_thread
 def _followed(begun: _Begun, path: Path | None, display: Display, interruption: Interruption):
     """Follow the stages of a run into a file; return the outcome, the reason to stop, and the writer."""
     stages, run, labelled = begun.stages, begun.run, begun.labelled

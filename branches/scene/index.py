@@ -83,19 +83,17 @@ class SymmetryWatch(Watch):
         return result
 
     def _within_law(self, system, x, point) -> Stability | None:
-        """Return the stability of a state; None where the energy is not convex and there is no index."""
-        if self._margin is None:
-            return self.at(system, x, point)
-        if not self._margin(system, x) > levels.APART:
+        """Return the stability of a state; None without an index: no convex energy, or no closed loop near it."""
+        if self._margin is not None and not self._margin(system, x) > levels.APART:
             return None
         try:
             return self.at(system, x, point)
-        except ValueError:  # not convex between the points where the margin was computed
+        except ValueError:  # not convex between the points where the margin was computed, or too far from the branch
             return None
 
-    def index(self, point) -> int:
-        """Return the index of a point, or `UNDECIDED`."""
-        result = self._within_law(point.system, point.x, point)
+    def index(self, point, x=None) -> int:
+        """Return the index of a point, or of unknowns beside it; `UNDECIDED` where there is none."""
+        result = self._within_law(point.system, point.x if x is None else x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def change(self, point) -> Change:
@@ -115,17 +113,13 @@ class SymmetryWatch(Watch):
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
         except ConvergenceError:  # for example at a bifurcation that was not located
             return UNDECIDED
-        result = self._within_law(point.system, there.x, point)
-        return result.index if result is not None and result.decided else UNDECIDED
+        return self.index(point, there.x)
 
     def _monitor(self, name) -> Event:
         """Return the test function of one symmetry class: its determinant, which is zero where the symmetry is broken."""
 
         def determinant(trial):
-            try:
-                result = self._within_law(trial.system, trial.x, trial)
-            except ValueError:  # too far from the branch: no closed loop, or no convex energy
-                return np.nan
+            result = self._within_law(trial.system, trial.x, trial)
             if result is None:
                 return np.nan  # no zero: the run ends before
             entry = result[name]
@@ -149,17 +143,14 @@ class SymmetryWatch(Watch):
         return self._step[2]
 
     def _moving(self, arc) -> set:
-        try:
-            ends = [self._within_law(trial.system, trial.x, trial) for trial in (arc.before, arc.trial)]
-        except ValueError:
-            return self._names
+        ends = [self._within_law(trial.system, trial.x, trial) for trial in (arc.before, arc.trial)]
         if None in ends:
             return self._names
-        both = [(before.name, before.eigenvalues, after.eigenvalues) for before, after in zip(*(end.classes for end in ends))]
-        return {
-            name for name, first, last in both  # where another number of intervals was condensed, there are others
-            if len(first) != len(last) or np.any(np.abs(last - first) > _MOVES * np.minimum(np.abs(first), np.abs(last)))
-        }  # fmt: skip
+        first, last = (np.array([entry.eigenvalues for entry in end.classes]) for end in ends)
+        if first.shape != last.shape:  # another number of intervals was condensed
+            return self._names
+        moved = np.any(np.abs(last - first) > _MOVES * np.minimum(np.abs(first), np.abs(last)), axis=1)
+        return {entry.name for entry, one in zip(ends[0].classes, moved) if one}
 
 
 def _broken(point) -> tuple[int, str]:
