@@ -103,7 +103,8 @@ class Lane(ABC):
         self._watch = rules.Watched(
             int(settings.branch_points), int(any(self.knows(test) for test in tests)), int(noisy),
             np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
-            np.array([test.value for test in held], dtype=float), np.array(sides), *self._home(),
+            np.array([test.value for test in held], dtype=float), np.array(sides),
+            free_of(start[0], start[1], system), np.array(system.weights[system.state_size :]),
         )  # fmt: skip
 
     @staticmethod
@@ -114,10 +115,6 @@ class Lane(ABC):
     def serves(self, system: Discretization, settings: Settings, noisy: bool) -> bool:
         """Return whether the lane is that of a system of the same run, with these settings."""
         return self.settings is settings and self.noisy == noisy and self.system is system
-
-    @abstractmethod
-    def _home(self) -> tuple[Array, Array]:
-        """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
 
     @abstractmethod
     def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
@@ -165,13 +162,8 @@ class SmallLane(Lane):
         assert equations is not None
         self._rooms = Rooms(
             equations, linear_of(system.size), self._frame, self._attempt, self._control, self._watch, _quotient(system.size),
-            spectra_of(system.state_size, system.size),
+            spectra_of(equations.states.shape[1], system.size, len(equations.states)),
         )  # fmt: skip
-
-    def _home(self) -> tuple[Array, Array]:
-        system, (home, x, _) = self.system, self._start
-        circles = np.append(system.circles, np.zeros(system.size - system.state_size))
-        return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
 
     def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
         made, indices = int(plain_steps(self._rooms, path, accepted)), list[int | None]()
@@ -218,10 +210,6 @@ class MeshLane(Lane):
     @staticmethod
     def knows(test: Event) -> bool:
         return test.asks is not None or test.still > 0
-
-    def _home(self) -> tuple[Array, Array]:
-        home, x, _ = self._start
-        return free_of(home, x, self.system), np.array(self.system.weights[self.system.state_size :])
 
     def _make(self, path: rules.Path, accepted: int, here: Trial) -> _Made:
         values, begun, indices = self._work.values, self._begun(path, here), list[int | None]()

@@ -145,7 +145,7 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int) -> int:
         step = _made(rooms, path, number)
         if step == 0.0 or rules.asks(frame, attempt, control, watch, path, accepted, number, step):
             return number - 2
-        if now[rules.CLOSES] > 0 or (watch.branch_points and not _calm(linear, quotient)):
+        if watch.branch_points and not _calm(linear, quotient):
             return number - 2
         if watch.eigenvalues and _eigenvalues_ask(equations, attempt, spectra, path, number, step):
             return number - 2

@@ -92,8 +92,8 @@ class Watched(NamedTuple):
 
     ``branch_points``, ``eigenvalues`` are 1 where these are watched, and ``noisy`` where round-off of Newton's method was
     noted. ``places``, ``values``: free parameters that take these values at special points; ``sides`` is 0, or the side of a
-    value that is a limit. ``home`` is the first point of the run, and ``closing`` the weights by which the distance to it is
-    measured, of its last unknowns.
+    value that is a limit. ``home`` are the unknowns of the first point of the run that are no states, and ``closing`` the
+    weights by which the distance to them is measured.
     """
 
     branch_points: int
@@ -340,13 +340,13 @@ def asks(
             return True
     now[CLOSES] = 0.0
     if accepted + number - 2 >= FEWEST:
-        one, other, begin = 0.0, 0.0, size - watch.home.size
-        for i in range(watch.home.size):
-            one += watch.closing[i] * (watch.home[i] - x[begin + i]) ** 2
-            other += watch.closing[i] * (watch.home[i] - new[begin + i]) ** 2
+        one, other, begin = 0.0, 0.0, frame.states
+        for i in range(begin, size):
+            one += watch.closing[i - begin] * (watch.home[i - begin] - x[i]) ** 2
+            other += watch.closing[i - begin] * (watch.home[i - begin] - new[i]) ** 2
         now[CLOSES] = 0.0 if math.sqrt(one) + math.sqrt(other) > REACH * step else 1.0
         rates, new_rates = path.tangents[number - 1], path.tangents[number]
-        for i in range(frame.states, size):
+        for i in range(begin, size):
             if misses(watch.home[i - begin], x[i], rates[i], new[i], new_rates[i], step):
                 now[CLOSES] = 0.0
     return control.primary >= 0 and _may_turn(attempt, control, path, number, step)

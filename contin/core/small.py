@@ -26,15 +26,15 @@ from contin.linalg.small import factor_small, solve_small
 BELIEVED, FAILED, ASKS = range(3)
 #: Largest number of unknowns of a small problem, whose eigenvalues take less time than a step: from some fifty on, LAPACK's
 #: factors are faster than those of a kernel.
-SMALL = 32
+SMALL = 33
 
 
 class Equations(NamedTuple):
     """F(x) = 0, as `contin.equilibria.equations` and `contin.cycles.map_equations` have it, and room to evaluate it in.
 
     ``parameters`` are all of them, ``free`` the places of the free ones. ``rates`` (equations,) takes values to rates of states
-    divided by their sizes, of u' = F. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and
-    ``gain``.
+    divided by their sizes, of u' = F. Of a map, ``is_map`` is 1 and ``gain`` (n,) what angles gain: F is the function of each
+    of the ``states`` (rounds, n) less the next one, the last time less the first one and ``gain``.
     """
 
     values: Loaded
@@ -73,14 +73,15 @@ def equations_of(system: Any) -> Equations | None:
     batch: Batch | None = system.small_equations
     if batch is None or batch.interpreted is not None or system.size > SMALL or system.size != system.equations + 1:
         return None
-    n, count, size, gain = system.state_size, system.equations, system.size, system.gain
-    rates = system.scales.rows["residual"] / system.scales.states if count == n else np.ones(count)
+    count, size, gain = system.equations, system.size, system.gain
+    rounds, n = system.states(np.zeros(size)).shape
+    values = count // rounds
+    rates = system.scales.rows["residual"] / system.scales.states if values == n else np.ones(values)
     return Equations(
         batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
-        np.zeros(count) if gain is None else gain, int(gain is not None), system.scaled_parameters(np.zeros(size)),
-        system._free,
-        np.zeros(1),
-        np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
+        np.zeros(values) if gain is None else gain, int(gain is not None), system.scaled_parameters(np.zeros(size)),
+        system._free, np.zeros(rounds), np.empty((rounds, n)), np.empty((0, n)), np.empty((rounds, values)),
+        np.zeros((rounds, values, n + len(system.free))), np.empty((0, 0, 0)),
     )  # fmt: skip
 
 
@@ -127,11 +128,12 @@ def corrected_small(system: Any, guess: Array, row: Array, target: float | Array
 @helper
 def put(equations: Equations, x: Array) -> None:
     """Put states and free parameters of x where functions find them."""
-    n = equations.states.shape[1]
-    for i in range(n):
-        equations.states[0, i] = x[i]
+    rounds, n = equations.states.shape
+    for j in range(rounds):
+        for i in range(n):
+            equations.states[j, i] = x[j * n + i]
     for k in range(equations.free.size):
-        equations.parameters[equations.free[k]] = x[n + k]
+        equations.parameters[equations.free[k]] = x[rounds * n + k]
 
 
 @helper
@@ -153,23 +155,29 @@ def evaluate_slopes(equations: Equations, x: Array) -> None:
 @helper
 def fill_residual(equations: Equations, right: Array) -> None:
     """Fill in F from what was evaluated."""
-    for i in range(equations.gain.size):
-        right[i] = equations.found[0, i]
-        if equations.is_map:
-            right[i] -= equations.states[0, i] + equations.gain[i]
+    rounds, values = equations.found.shape
+    for j in range(rounds):
+        for i in range(values):
+            right[j * values + i] = equations.found[j, i]
+            if equations.is_map:
+                right[j * values + i] -= equations.states[(j + 1) % rounds, i] + (equations.gain[i] if j == rounds - 1 else 0.0)
 
 
 @helper
 def fill_matrix(equations: Equations, row: Array, matrix: Array) -> None:
     """Fill in [F_x; row] from what was evaluated."""
-    size = row.size
-    for i in range(size - 1):
-        for j in range(size):
-            matrix[i, j] = equations.slopes_found[0, i, j]
+    size, slopes = row.size, equations.slopes_found
+    (_, values, count), n = slopes.shape, equations.states.shape[1]
+    for at in range(size - 1):
+        j, i = at // values, at % values
+        for k in range(size):
+            matrix[at, k] = 0.0
+        for k in range(count):
+            matrix[at, j * n + k if k < n else size - count + k] = slopes[j, i, k]
         if equations.is_map:
-            matrix[i, i] -= 1.0
-    for j in range(size):
-        matrix[size - 1, j] = row[j]
+            matrix[at, (at + n) % (size - 1)] -= 1.0
+    for k in range(size):
+        matrix[size - 1, k] = row[k]
 
 
 @helper

@@ -271,8 +271,8 @@ class MapSystem(OfCycles, Algebraic):
 
     @property
     def small_equations(self) -> Any:
-        """The map, of fixed points."""
-        return self._residual if type(self) is MapSystem and self.rounds == 1 else None
+        """The map, where it is one at all points."""
+        return self._residual if type(self) is MapSystem and isinstance(self._residual, Batch) else None
 
     def form(self, x: Array) -> MapForm:
         """Return that of a cycle of the map."""

@@ -18,6 +18,7 @@ from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, 
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import APART, LOCATED
+from contin.linalg.periodic import Product, fill_logarithms, product_of
 from contin.linalg.small import fill_eigenvalues
 
 #: Parts of a step at which multipliers are known: both ends, and `LOOKS` between them.
@@ -60,10 +61,12 @@ class Spectra(NamedTuple):
 
     ``values`` are those of the test function of period doublings, ``cubic`` (4, size) the coefficients of the cubic between
     both ends, ``place`` a point of it, ``parts`` the places as parts of the step, ``ends`` and ``quarters`` room for moves.
-    ``moved`` (1,) is how far they moved in the step before, as parts of their distances from the circle.
+    ``moved`` (1,) is how far they moved in the step before, as parts of their distances from the circle. ``square``
+    (rounds, n, n) are matrices, whose ``product`` multipliers of maps belong to.
     """
 
     square: Stack
+    product: Product
     ones: Matrix
     others: Matrix
     real: Matrix
@@ -77,10 +80,11 @@ class Spectra(NamedTuple):
     quarters: Moves
 
 
-def spectra_of(n: int, size: int) -> Spectra:
-    """Return the room for n eigenvalues of a problem with so many unknowns."""
+def spectra_of(n: int, size: int, rounds: int = 1) -> Spectra:
+    """Return the room for n eigenvalues of a problem with so many unknowns, or of so many matrices."""
+    ones, others = np.empty((2, 1, n))
     return Spectra(
-        np.empty((1, n, n)), np.empty((1, n)), np.empty((1, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)),
+        np.empty((rounds, n, n)), product_of(rounds, n), ones, others, np.empty((_COUNT, n)), np.empty((_COUNT, n)),
         np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES, np.full(1, np.inf),
         moves_of((FIRST, LAST), n), moves_of(_QUARTERS, n),
     )  # fmt: skip
@@ -99,21 +103,22 @@ def insert(real: Vector, imaginary: Vector, count: int, x: float, y: float) -> N
 @helper
 def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
     """Fill in a row from the derivatives that were evaluated; return whether round-off decides on the side of one of them."""
-    n, doubt = spectra.real.shape[1], False
+    (rounds, n, _), doubt = spectra.square.shape, False
+    for k in range(rounds):
+        for i in range(n):
+            for j in range(n):
+                spectra.square[k, i, j] = equations.slopes_found[k, i, j] * equations.rates[i]
+    one, other, largest = spectra.ones[0], spectra.others[0], 0.0
+    if equations.is_map:
+        fill_logarithms(spectra.square, spectra.product, one, other)
+    else:
+        fill_eigenvalues(spectra.square, n, spectra.ones, spectra.others)
     for i in range(n):
-        for j in range(n):
-            spectra.square[0, i, j] = equations.slopes_found[0, i, j] * equations.rates[i]
-    fill_eigenvalues(spectra.square, n, spectra.ones, spectra.others)
-    one, other = spectra.ones[0], spectra.others[0]
-    largest = 0.0
-    for i in range(n):
-        x, y = one[i], other[i]
-        size = math.hypot(x, y)
         if equations.is_map:
-            one[i], other[i] = math.log(max(size, NO_MULTIPLIER)), math.atan2(y, x)
+            one[i] = max(one[i], math.log(NO_MULTIPLIER))
             doubt = doubt or not abs(one[i]) >= APART
         else:
-            largest = max(largest, size)
+            largest = max(largest, math.hypot(one[i], other[i]))
     real, imaginary = spectra.real[number], spectra.imaginary[number]
     for i in range(n):
         x, y = one[i], other[i]

@@ -49,8 +49,12 @@ def equilibria(field, states, parameters, free="a", **options):
     return lambda: Algebraic(AlgebraicProblem(field, states, parameters, **options), [free])
 
 
-def maps(field, states, parameters, free="a"):
-    return lambda: MapSystem(MapProblem(field, states, parameters), [free])
+def circle(u, p):
+    return (u.x + p.a - p.k / (2 * math.pi) * math.sin(2 * math.pi * u.x),)
+
+
+def maps(field, states, parameters, angles=(), **values):
+    return lambda: MapSystem(MapProblem(field, states, parameters, angles=angles), ["a"], values)
 
 
 SQUARE = {"square": lambda u, p: u.x**2 + p.a}
@@ -87,6 +91,13 @@ RUNS = {
     "delayed logistic map": (
         maps(delayed, ["x", "y"], {"a": 1.5}), [1 / 3, 1 / 3],
         {"limits": {"a": (1.1, 2.5)}, "step": 0.02, "max_step": 0.02},
+    ),
+    "Henon, cycle of 2": (
+        maps(henon, ["x", "y"], {"a": 0.5, "b": 0.3}, rounds=2.0), [1.37, 0.01, 0.03, 0.41],
+        {"limits": {"a": (0.2, 1.2)}, "step": 0.02, "max_step": 0.05},
+    ),
+    "locked to one round in 3": (
+        maps(circle, ["x"], {"a": 0.3333, "k": 0.95}, angles={"x": 1}, rounds=3.0, winding_x=1.0), [0.1, 0.4, 0.75], {},
     ),
     "no look": (
         equilibria(lambda u, p: (p.a + u.x - u.x**3,), ["x"], {"a": -2.0}, dynamics=False), [-1.5],
@@ -146,7 +157,9 @@ def test_the_same_branch_as_one_by_one(name, direction):
     assert_alike(points, others)
 
 
-@pytest.mark.parametrize("name, count", [("Lorenz", 3), ("snake", 7), ("Henon", 2), ("net of 6", 9), ("small sizes", 3)])
+@pytest.mark.parametrize(
+    "name, count", [("Lorenz", 3), ("snake", 7), ("Henon", 2), ("net of 6", 9), ("small sizes", 3), ("Henon, cycle of 2", 3)]
+)
 def test_most_steps_are_plain(name, count, monkeypatch):
     """Those that are made one by one pass special points, or end the run, but for one or two."""
     careful = []
