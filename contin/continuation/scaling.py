@@ -37,7 +37,7 @@ from contin.core.system import USUAL, System, usual
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.folds import on_finer_mesh
-from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH
+from contin.levels import APART, CORRECTED, DOUBLED, LOCATED, ROUGH, ROUND_OFF
 from contin.linalg.blocks import MANY
 from contin.problems.statement import declared
 
@@ -53,6 +53,12 @@ _LASTS = 0.1
 #: found. Of single numbers two that are nothing but round-off agree to a
 #: thirtieth in one case of fifty: under one of OpenBLAS's kernels an arch had a multiplier of size 1e-16, and did not move.
 _CLEAR = 1e4
+#: Random vectors along which changes of F are looked at, at most: one may lead out of the domain of a connection, or move a
+#: state by little by chance. Each takes five residuals, a search a hundred solutions.
+_VECTORS = 2
+#: A state in which F is linear up to this change has no size. At 1e9, one of 1e10 would not be searched for; numbers of 1e160
+#: have no squares.
+_LINEAR = 1e12
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
 _HIGHEST = 5
 
@@ -80,7 +86,7 @@ def scaled(
     if unknown or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
         said = _said(primary, settings)
-        if said >= USUAL[0] and first.usual(np.isin(names, unknown)):
+        if said >= USUAL[0] and any(first.usual(np.isin(names, unknown)) for _ in range(_VECTORS)):
             sizes = np.where(sizes < USUAL[0], 1.0, sizes)
         else:
             sizes = first.sizes(np.array([given.get(name, 0.0) for name in names]), said)
@@ -144,8 +150,9 @@ class _FirstPoint:
         """Return whether all sizes are of order one, as changes of F along a random vector show: they are not looked for then.
 
         For changes of 0.01 in all unknowns, F is nearly linear. For changes of 1, each ``unknown`` that does not change along
-        the branch changes by terms that are not linear; for a change of 1000 of its own, most of that is not linear in it, or
-        there are such terms for a change of 1 of its own alone.
+        the branch changes by terms that are not linear, or not at all: then no term of the expansion moves it. For a change of
+        1000 of its own, most of that is not linear in it, or there are such terms for a change of 1 of its own alone, or it is
+        linear in it up to 1e12: then it has no size.
         """
         largest, at_rest, along = self.system.largest, self.system.residual(self.x), self.system.largest(self.linear.tangent)
         still = unknown & (along < USUAL[0])
@@ -159,12 +166,18 @@ class _FirstPoint:
                 return np.full_like(self.x, np.inf)
             return np.asarray(self._factors.solve(np.append(values, self.row @ change)) - change)
 
-        here, far = missed(1.0), missed(np.where(still, USUAL[1], 1.0))
-        bent = (largest(far - USUAL[1] * here) >= USUAL[1] / 2 * largest(here)) & (largest(far) < np.inf)
-        follows = largest(here) >= USUAL[0]
-        if not (follows.any() and np.all(largest(missed(USUAL[0])) <= USUAL[0]) and np.all(follows | ~still)):
+        def bent(size: float) -> Array:
+            far = missed(np.where(still, size, 1.0))
+            return np.where(largest(far) < np.inf, largest(far - size * here) / (size * largest(here)), np.nan)
+
+        here = missed(1.0)
+        follows, idle = largest(here) >= USUAL[0], along + largest(here) < ROUND_OFF
+        if not (follows.any() and np.all(largest(missed(USUAL[0])) <= USUAL[0]) and np.all(follows | idle | ~still)):
             return False
-        return bool(np.all(bent | ~still) or np.all(bent | ~still | (largest(missed(np.where(still, 1.0, 0.0))) >= USUAL[0])))
+        clear = idle | ~still | (bent(USUAL[1]) >= 0.5)
+        if not clear.all():
+            clear |= largest(missed(np.where(still, 1.0, 0.0))) >= USUAL[0]
+        return bool(clear.all() or np.all(clear | (bent(_LINEAR) < 0.5)))
 
     @np.errstate(over="ignore")  # what a term of 1e-316 bounds is far away
     def sizes(self, stated: Array, said: float) -> Array:
@@ -439,6 +452,11 @@ class _FirstPoint:
             error = np.maximum(error, 2 * on.largest(finer.x - carry(x)))
             turned = finer.tangent / rate - carry(self.tangent)
             error_of_tangent = np.maximum(error_of_tangent, 2 * on.largest(turned))
+        for move in system.cut_off_errors(x, self._factors):
+            turned = system.linearize(x + move, (self.row,))[1].solve(unit)
+            turned /= turned[at] or 1.0
+            error = np.fmax(error, system.largest(move))
+            error_of_tangent = np.fmax(error_of_tangent, system.largest(turned - self.tangent))
         return error, error_of_tangent
 
     @property

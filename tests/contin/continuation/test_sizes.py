@@ -9,6 +9,7 @@ from scipy.special import ellipk, jn_zeros
 
 import contin
 from contin import AlgebraicProblem, BoundaryValueProblem, ConnectionProblem, solve, trace
+from contin.continuation import scaling
 
 
 def column(load=1.0, height=1.0):
@@ -102,14 +103,30 @@ def test_usual_sizes_need_no_expansion():
     assert branch[0].system.scales.are_one and not expanded(bratu.batch("field"))
 
 
-def test_a_state_that_is_as_far_from_linear_for_1_as_for_1000_needs_no_expansion():
-    """The difference d of two pendula, in sin(4 d)."""
-    problem = AlgebraicProblem(
-        lambda u, p: (p.a - u.x**2 + u.d**2, math.sin(4 * u.d) - u.z * u.d, u.x - 2 * u.z), ["x", "d", "z"], {"a": 1.0}
-    )
-    branch = trace(solve(problem, [1.0, 0.0, 0.5]), free=["a"], limits={"a": (0.5, 3)})
+def chua(u, p):
+    """Chua's circuit, whose current y is zero at all equilibria: no term of an expansion moves it."""
+    return p.alpha * (u.y - u.x**3 / 16 + u.x / 6), u.x - u.y + u.z, -14.0 * u.y
+
+
+def turning(u, p):
+    """The difference d of two pendula: sin(4 d) is as far from linear for 1 as for 1000."""
+    return p.alpha - u.x**2 + u.d**2, math.sin(4 * u.d) - u.z * u.d, u.x - 2 * u.z
+
+
+def linear(u, p):
+    """Two states with a factor that is not linear: their modes at alpha = 8 and 10 have no amplitude."""
+    return p.alpha - u.x**2, (u.x**2 - 9) * u.u + u.v, u.u + (u.x**2 - 9) * u.v
+
+
+@pytest.mark.parametrize(("field", "names", "guess"), [
+    (chua, ["x", "y", "z"], [math.sqrt(8 / 3), 0.0, -math.sqrt(8 / 3)]), (turning, ["x", "d", "z"], [1.0, 0.0, 0.5]),
+    (linear, ["x", "u", "v"], [1.0, 0.0, 0.0]),
+])  # fmt: skip
+def test_states_that_stay_zero_need_no_expansion(field, names, guess):
+    problem = AlgebraicProblem(field, names, {"alpha": 1.0}, dynamics=False)
+    branch = trace(solve(problem, guess), free=["alpha"], limits={"alpha": (0.5, 3)})
     assert branch[0].system.scales.are_one and not expanded(problem.batch("residual"))
-    assert branch[-1]["a"] == 3 and branch[-1]["d"] == pytest.approx(0.0, abs=1e-12)
+    assert branch[-1]["alpha"] == 3 and branch[-1][names[1]] == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("load", [1.0, 0.06, 125.0])
@@ -211,6 +228,16 @@ def sandstede(u, p):
     )
 
 
+def leaf(half_time):
+    """The orbit at a = 0."""
+
+    def orbit(t):
+        x = 1 / math.cosh(half_time * (t - 0.5)) ** 2
+        return x, -x * math.tanh(half_time * (t - 0.5)), 0
+
+    return orbit
+
+
 ORBITS = [
     ("alpha", (0, 1), {"alpha": 0.0, "gamma": 0.0}),
     ("c", (-3, -1), {"alpha": 1.0, "gamma": 3.0}),
@@ -227,17 +254,23 @@ def test_unfolding_parameters_that_are_zero(name, limits, numbers, direction):
     """The orbit is there for all values of a, c, alpha, beta, gamma: nu stays zero, z is zero but for errors."""
     values = {"a": 0.0, "c": -2.0, "alpha": 0.0, "beta": 1.0, "gamma": 0.0, "mu": 0.0, "nu": 0.0}
     problem = ConnectionProblem(sandstede, ["x", "y", "z"], {**values, **numbers}, unstable=1)
-
-    def guess(t):
-        x = 1 / math.cosh(20 * (t - 0.5)) ** 2
-        return x, -x * math.tanh(20 * (t - 0.5)), 0
-
-    found = solve(problem, guess, {"time": 40}, free=["nu"])
+    found = solve(problem, leaf(20), {"time": 40}, free=["nu"])
     branch = trace(found, free=[name, "nu"], limits={name: limits}, direction=direction)
     end = limits[direction > 0]
     assert str(branch.stop) == f"reached {name} = {end:g}" or found[name] == end
     assert len(branch) < 30 and max(abs(branch.column("nu"))) < 1e-9
     assert abs(branch.points[-1].system.states(branch.points[-1].x)[:, 2]).max() < 1e-7
+
+
+def test_what_cutting_off_an_infinite_time_leaves_is_no_size(monkeypatch):
+    """The orbit does not move with alpha, but for 1e-9 of z: a search must not take that for the size of z."""
+    values = {"a": 0.0, "c": -2.0, "alpha": 0.0, "beta": 1.0, "gamma": 0.0, "mu": 0.0, "nu": 0.0}
+    orbit = solve(ConnectionProblem(sandstede, ["x", "y", "z"], values, unstable=1), leaf(10), {"time": 20}, free=["nu"])
+    first = trace(orbit, free=["a", "nu"], limits={"a": (-0.5, 0.25)})
+    monkeypatch.setattr(scaling._FirstPoint, "usual", lambda *_: False)
+    branch = trace(first[-1], free=["alpha", "nu"], limits={"alpha": (-1, 1.6952)})
+    assert branch[0].system.scales.are_one and len(branch) < 12
+    assert [point.label for point in branch if point.label] == ["EP", "IFS", "EP"]
 
 
 def test_round_off_in_a_boundary_condition_is_no_size():
