@@ -99,9 +99,10 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
             moves, unclear = _moving(looked)
     pieces = zip(itertools.pairwise(looked), moves)  # none passes where eigenvalues do not move so far
     passed = [(left[0], right[0]) for (left, right), far in pieces if far and _passes_as_pair(left[1], right[1])]
+    ends = {s for pair in passed for s in pair}
     if len(passed) > 1 or (passed and not any(_passes_as_pair(a[1], b[1]) for a, b in itertools.pairwise(knots))):
-        inside = sorted({*inside, *(s for pair in passed for s in pair)} - {s for s, _ in knots})
-        knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda knot: knot[0])
+        ends.update(inside)
+    knots = sorted([*knots, *((s, arc.near(s)) for s in sorted(ends - {s for s, _ in knots}))], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
         found += _between(arc, left, right, 0)
