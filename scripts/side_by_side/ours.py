@@ -38,18 +38,23 @@ def take_autos_tolerances() -> None:
     1e-5, and so this tolerance of meshes is no stricter than what the demos are run with.
     """
     for kind, name, value in ((Newton, "tolerance", 1e-7), (MeshControl, "tolerance", 1e-5), (Settings, "errors", False)):
-        kind.__init__ = functools.partialmethod(_made_with, kind.__init__, name, value)
+        kind.__init__ = _made_with(kind.__init__, name, value)
 
 
 def take_path_tolerance() -> None:
     """Let this process run all demos with points between labelled ones, which are not compared, that are less exact."""
-    Settings.__init__ = functools.partialmethod(_made_with, Settings.__init__, "path_tolerance", 1e-8)
+    Settings.__init__ = _made_with(Settings.__init__, "path_tolerance", 1e-8)
 
 
-def _made_with(made: object, init: Callable[..., None], name: str, value: object, *given: object, **named: object) -> None:
-    """Make settings with one of their values, whatever a demo states of it."""
-    init(made, *given, **named)
-    object.__setattr__(made, name, value)
+def _made_with(init: Callable[..., None], name: str, value: object) -> Callable[..., None]:
+    """Return what makes settings with one of their values, whatever a demo states of it."""
+
+    @functools.wraps(init)  # one function, not a new one each time: what contin knows of its arguments is kept
+    def made(settings: object, *given: object, **named: object) -> None:
+        init(settings, *given, **named)
+        object.__setattr__(settings, name, value)
+
+    return made
 
 
 def branches(demo: Demo) -> list:
