@@ -102,6 +102,8 @@ def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     ends = {s for pair in passed for s in pair}
     if len(passed) > 1 or (passed and not any(_passes_as_pair(a[1], b[1]) for a, b in itertools.pairwise(knots))):
         ends.update(inside)
+    elif len(looked) == len(knots) + len(inside):  # no other pair comes near the axis
+        ends.clear()
     knots = sorted([*knots, *((s, arc.near(s)) for s in sorted(ends - {s for s, _ in knots}))], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
