@@ -356,7 +356,8 @@ class System(Discretization):
         """
         wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
         wide[:, : states.shape[1]] = states
-        wide[:, states.shape[1] + self._free[: v.shape[-1] - self.state_size]] = v[..., self.state_size :]
+        if v.shape[-1] > self.state_size:
+            wide[:, states.shape[1] + self._free[: v.shape[-1] - self.state_size]] = v[..., self.state_size :]
         return wide
 
     def _scaled_states(self, x: Array) -> Array:

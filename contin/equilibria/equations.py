@@ -85,6 +85,20 @@ class EquilibriumForm(DenseForm):
         """Return the length of v in the user's units."""
         return float(np.linalg.norm(right * self._sizes))
 
+    def pair(self, frequency: float | None) -> CriticalPair:
+        """Return the pair of eigenvalues that is nearest to -+ i ``frequency``.
+
+        Without a frequency, it is the complex pair nearest to the imaginary axis.
+        """
+        if frequency is None:
+            values = np.linalg.eigvals(self._open)
+            frequency = float(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
+        with np.errstate(all="ignore"):
+            left, (right, _) = self.critical(1j * frequency)
+            missed: Any = self._open @ right - 1j * frequency * right
+            off = float(np.divide(self.length(missed), abs(frequency)))
+            return CriticalPair(frequency, np.asarray(right, complex), np.asarray(left, complex), off)
+
 
 #: Places on a small cycle at which a field is compared with its polynomial of third degree.
 _WAVES = 8
@@ -116,17 +130,8 @@ _CRITICAL = 1e-4
 
 
 def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPair:
-    """Return the pair of eigenvalues that is nearest to -+ i ``frequency``.
-
-    Without a frequency, it is the complex pair nearest to the imaginary axis.
-    """
-    if frequency is None:
-        values = np.linalg.eigvals(jacobian)
-        frequency = float(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
-    with np.errstate(all="ignore"):
-        left, (right, _) = EquilibriumForm(jacobian, np.ones(len(jacobian)), lambda _: jacobian).critical(1j * frequency)
-        off = np.linalg.norm(jacobian @ right - 1j * frequency * right) / abs(frequency)
-        return CriticalPair(frequency, np.asarray(right, complex), np.asarray(left, complex), float(off))
+    """Return that of `EquilibriumForm.pair`, in the user's units."""
+    return EquilibriumForm(jacobian, np.ones(len(jacobian)), lambda _: jacobian).pair(frequency)
 
 
 #: The kind of curves of homoclinic orbits, which leave from the first.
@@ -308,7 +313,8 @@ class Algebraic(Spectral, Composed):
         if self.problem.jacobian is not None and term.batch.interpreted is not None:
             return np.array([self._along_given(x, [stack[k] for stack in directions]) for k in range(count)])
         _, u, v, p = term.inputs(x)
-        wide = [self._wide(stack.repeat(len(u), 0), stack[:, :size].reshape(-1, u.shape[1])) for stack in directions]
+        wide = [self._wide(stack.repeat(len(u), 0) if len(u) > 1 else stack, stack[:, :size].reshape(-1, u.shape[1]))
+                for stack in directions]  # fmt: skip
         return term.batch.along(np.zeros(len(wide[0])), np.concatenate([u] * count), v, p, wide).reshape(count, -1)
 
     def _along_given(self, x: Array, directions: Sequence[Array]) -> Array:
@@ -463,7 +469,7 @@ class Algebraic(Spectral, Composed):
             Event(Label.ZERO_HOPF, "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
         ]
 
-    def form(self, x: Array) -> DenseForm:
+    def form(self, x: Array) -> Any:
         """Return the characteristic matrix and the forms at an equilibrium."""
         field = self.as_field()
         return EquilibriumForm(self.jacobian(x), self.scales.states, lambda stacks: field.stack_along(x, stacks))
@@ -475,19 +481,19 @@ class Algebraic(Spectral, Composed):
         frequency, x = frequency_of(point), point.trial.x
         if frequency is None or not point.is_simple:
             return None
-        if not np.abs(eigenvalues(self.jacobian(x)) - 1j * frequency).min() < _CRITICAL * abs(frequency):
+        form = self.form(x)
+        if not form.pair(frequency).is_critical:
             return None
-        return at_special_point(self, point) if self.is_smooth(x, frequency) else NOT_SMOOTH
+        return at_special_point(self, point, form) if self.is_smooth(x, frequency, form) else NOT_SMOOTH
 
-    def is_smooth(self, x: Array, frequency: float) -> bool:
+    def is_smooth(self, x: Array, frequency: float | None, form: EquilibriumForm | None = None) -> bool:
         """Return whether the field at a Hopf point is a polynomial of third degree but for terms of fourth, along small cycles.
 
-        It is tried on smaller and smaller ones, until what is left is round-off.
+        It is tried on smaller and smaller ones, until what is left is round-off. ``form`` is that at x, if it is at hand.
         """
         field, last, ratio = self.thawed.as_field(), np.nan, np.nan
-        (term,), pair = field._terms, critical_pair(self.jacobian(x), frequency)
-        vector = pair.right / self.scales.states
-        turning = np.exp(2j * np.pi * np.arange(_WAVES) / _WAVES)[:, None] * vector / np.abs(vector).max()
+        (term,), pair = field._terms, (form or self.form(x)).pair(frequency)
+        turning = np.exp(2j * np.pi * np.arange(_WAVES) / _WAVES)[:, None] * pair.right / np.abs(pair.right).max()
         waves, along = turning.real, (1j * pair.frequency * turning).real
         _, u, none, p = term.inputs(x)
 

@@ -136,6 +136,7 @@ class Form(ABC):
     weights: Array
     doubled_side = 1
     borders: Borders | None = None
+    _critical: tuple[complex, tuple[Any, Direction]] | None = None
 
     @property
     def reduced(self) -> Form:
@@ -188,14 +189,17 @@ class Form(ABC):
         return np.zeros_like(states)
 
     def critical(self, rate: complex) -> tuple[Any, Direction]:
-        """Return the null vectors w and v of L(rate)."""
+        """Return the null vectors w and v of L(rate), found once."""
+        if self._critical is not None and self._critical[0] == rate:
+            return self._critical[1]
         coupling, size = self.coupling(rate), len(self.places)
 
         def bordered(b: Array, c: Array) -> Bordered:
             return Bordered(self.solver(coupling, (b, c)), (self.equations, size))
 
         found, _ = null_vectors(bordered, (self.equations, size), self.borders)
-        return self.normalized(found.left[0], found.right[0])
+        self._critical = rate, self.normalized(found.left[0], found.right[0])
+        return self._critical[1]
 
 
 class DenseForm(Form):
@@ -310,11 +314,14 @@ def coefficient(
     return dataclasses.replace(found, side=here.doubled_side) if terms is flip else found
 
 
-def at_special_point(system: System, point: SpecialPoint) -> Coefficient | None:
-    """Return the coefficient at a fold, or where one multiplier or pair is critical; None at other special points."""
+def at_special_point(system: System, point: SpecialPoint, here: Form | None = None) -> Coefficient | None:
+    """Return the coefficient at a fold, or where one multiplier or pair is critical; None at other special points.
+
+    ``here`` is the form there, if that is at hand.
+    """
     terms = None if point.test is None or system.outcomes.size else point.test.normal_form
     if terms is fold:
         return coefficient(system, point.trial.x, fold) if point.details is None and point.is_located else None
     if terms is None or not point.is_simple:
         return None
-    return coefficient(system, point.trial.x, terms, *([point.details["frequency"]] if terms is pair else []))
+    return coefficient(system, point.trial.x, terms, *([point.details["frequency"]] if terms is pair else []), here=here)

@@ -636,7 +636,7 @@ class Batch:
 
     def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
         """Return the columns of derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
-        kept, key = self._own.kept, ("columns", tuple(free), None if order is None else tuple(order))
+        kept, key = self._own.kept, ("columns", np.asarray(free, np.int64).tobytes(), None if order is None else tuple(order))
         if key not in kept:
             states = len(self.signature.states) * (1 + self.signature.ends)
             inputs = (*(range(states) if order is None else map(int, order)), *(states + int(slot) for slot in free))
