@@ -35,7 +35,6 @@ from contin.core.trial import Event, Trial
 from contin.events.arc import SpecialPoint
 from contin.events.error import Solution
 from contin.levels import CORRECTED, DOUBLED, LOCATED, ROUGH
-from contin.linalg.orientation import oriented
 
 if TYPE_CHECKING:
     from contin.connections.equations import ConnectionCollocation
@@ -164,9 +163,8 @@ def _leading(trial: Trial, side: int) -> ComplexArray:
 def _leading_vectors(trial: Trial, side: int) -> tuple[Array, Array]:
     """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
     system = trial.system
-    at = system.problem.unstable - side
-    here, there = system.saddle(trial.x).pair(at), system.saddle(system.reference).pair(at)
-    signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
+    here = system.saddle(trial.x).pair(system.problem.unstable - side)
+    signs = [np.sign((vector.conj() @ known).real) for vector, known in zip(here, system.leading_pairs[side])]
     right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
     return right, left
 

@@ -25,22 +25,25 @@ from contin.events.error import Solution
 from contin.functions.origin import Place, not_finite
 from contin.levels import APART
 from contin.linalg.blocks import Factors, Share, share
+from contin.linalg.orientation import oriented
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.statement import TIME
 
 #: What is computed when it is first asked for, and depends on the reference.
-_OF_A_REFERENCE = ("_known", "_complements")
+_OF_A_REFERENCE = ("_known", "_borders", "leading_pairs")
 
 
 class SaddleSpectrum(NamedTuple):
-    """Eigenvalues at the first equilibrium, the largest real part first, and their eigenvectors as columns."""
+    """Eigenvalues at the first equilibrium, the largest real part first, and both kinds of eigenvectors as columns."""
 
     values: ComplexArray
     right: ComplexArray
+    left: ComplexArray
 
     def pair(self, at: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return the right and the left eigenvector of an eigenvalue."""
-        return self.right[:, at], np.asarray(np.linalg.inv(self.right)[at], dtype=complex)
+        """Return the right and the left eigenvector of an eigenvalue, whose product is one."""
+        right, left = self.right[:, at], self.left[:, at].conj()
+        return right, left / (left @ right)
 
 
 class ConnectionCollocation(Collocation):
@@ -92,14 +95,20 @@ class ConnectionCollocation(Collocation):
         self._phase = self.phase_row(self._scaled_states(x))
         self._target = float(self._phase @ x)
         left_vectors = self._left_vectors(self.all_parameters(x))  # the closest orthonormal bases of the same spaces
-        self._bases = tuple(u @ v for u, _, v in (np.linalg.svd(left, full_matrices=False) for left in left_vectors))
-        left, _, right = np.linalg.svd(self.saddle_jacobian(x))
-        self._borders = left[:, -1], right[-1]
+        both = [(len(left), *_singular(left)) for left in left_vectors]
+        self._bases = tuple(u @ v[:count] for count, u, v in both)
+        self._complements = [v[count:].T for count, _, v in both]  # orthonormal, too
 
     _phase: Array
     _target: float
     _bases: Any
-    _borders: tuple[Array, Array]
+    _complements: list[Array]
+
+    @functools.cached_property
+    def _borders(self) -> tuple[Array, Array]:
+        """The singular vectors b and c at the reference."""
+        left, right = _singular(self.saddle_jacobian(self.reference))
+        return left[:, -1], right[-1]
 
     # --- the conditions at the ends ------------------------------------------------------------------------------
 
@@ -184,11 +193,6 @@ class ConnectionCollocation(Collocation):
         A, L = linear.jacobian, _normalized(_left_subspace(linear.schur, self.problem.conditions[end], stable=end == 0), Q)
         made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
         return Q, L, lambda right: made()(-right @ N) @ N.T
-
-    @functools.cached_property
-    def _complements(self) -> list[Array]:
-        """The orthonormal N of the complements of Q."""
-        return [np.linalg.qr(Q.T, mode="complete")[0][:, len(Q) :] for Q in self._bases]
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along subsets of the directions.
@@ -353,6 +357,12 @@ class ConnectionCollocation(Collocation):
         """Return eigenvalues and eigenvectors at the first equilibrium."""
         return self._once("saddle", self.all_parameters(x), lambda: _spectrum(self.saddle_jacobian(x)))
 
+    @functools.cached_property
+    def leading_pairs(self) -> list[list[ComplexArray]]:
+        """The eigenvectors, right and left, of the leading stable and unstable eigenvalue at the reference, with one sign."""
+        spectrum, unstable = self.saddle(self.reference), self.problem.unstable
+        return [[oriented(vector) for vector in spectrum.pair(at)] for at in (unstable, unstable - 1)]
+
     def left_null_vector(self, x: Array, factors: Factors | None = None) -> Array:
         """Return w with w F_z = 0, of unit length, z all unknowns but the user's parameters, with the sign of the reference.
 
@@ -369,7 +379,7 @@ class ConnectionCollocation(Collocation):
         units = np.zeros((len(own), self.size))
         units[range(len(own)), [self.parameter_index(name) for name in own]] = 1.0
         found = factors.solve_transposed(units)
-        left = np.linalg.svd(found[:, self.equations :])[0][:, -1]
+        left = _singular(found[:, self.equations :])[0][:, -1]
         w: Array = left @ found[:, : self.equations]
         is_reference = x is self.reference
         near = generator("null").standard_normal(w.size) if is_reference else self.left_null_vector(self.reference, factors)
@@ -431,7 +441,7 @@ class ConnectionCollocation(Collocation):
 
     def adjoint_at_ends(self, x: Array, w: Array) -> tuple[Array, Array]:
         """Return L^T w and L'^T w, of the entries of a left vector that belong to the projection conditions."""
-        first, last = (known[()] for known in self._subspaces_along(self.all_parameters(x), []))
+        (_, first, _), (_, last, _) = self._subspaces(self.all_parameters(x))
         own = w[-self._further :]
         return first.T @ own[: len(first)], last.T @ own[len(first) : len(first) + len(last)]
 
@@ -487,9 +497,22 @@ class ConnectionCollocation(Collocation):
 
 
 def _spectrum(jacobian: Array) -> SaddleSpectrum:
-    values, vectors = np.linalg.eig(jacobian)
-    order = np.argsort(-values.real)
-    return SaddleSpectrum(values[order].astype(complex), vectors[:, order].astype(complex))
+    from scipy.linalg.lapack import dgeev  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+    real, imaginary, left, right, _ = dgeev(jacobian)
+    order, both = np.argsort(-real), np.array([left, right], dtype=complex)
+    for at in np.flatnonzero(imaginary > 0):  # the real and the imaginary part are two columns
+        both[:, :, at] += 1j * both[:, :, at + 1]
+        both[:, :, at + 1] = both[:, :, at].conj()
+    return SaddleSpectrum((real + 1j * imaginary)[order], both[1][:, order], both[0][:, order])
+
+
+def _singular(matrix: Array) -> tuple[Array, Array]:
+    """Return the left singular vectors of a small matrix as columns, and the right ones as rows."""
+    from scipy.linalg.lapack import dgesdd
+
+    u, _, v, _ = dgesdd(matrix) if matrix.size else (np.eye(len(matrix)), None, np.eye(matrix.shape[1]), 0)
+    return u, v
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -513,7 +536,7 @@ class _Schur(NamedTuple):
 
 
 def _schur(matrix: Array) -> _Schur:
-    from scipy.linalg.lapack import dgees  # type: ignore[import-untyped]  # .1 s; only this needs it
+    from scipy.linalg.lapack import dgees
 
     t, _, rates, _, v, _, _ = dgees(lambda *_: 0, matrix, sort_t=0)
     return _Schur(t, v, rates)
@@ -554,7 +577,11 @@ def _normalized(left: Array, basis: Array) -> Array:
 
     Raises ConvergenceError where a direction of one space is orthogonal to the other one: L has no finite entries.
     """
-    try:
-        return np.asarray(np.linalg.solve(left @ basis.T, left), dtype=float)
-    except np.linalg.LinAlgError:
-        raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step") from None
+    from scipy.linalg.lapack import dgesv
+
+    if not len(left):
+        return left
+    *_, found, singular = dgesv(left @ basis.T, left)
+    if singular:
+        raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step")
+    return np.ascontiguousarray(found)
