@@ -17,7 +17,7 @@ from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.corner import zeros
-from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
+from contin.events.labelled import Stability, contradiction, nullity_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import refined
 from contin.events.usual import with_normal_form
@@ -79,7 +79,7 @@ class Notes:
 
         They do where the kernel is the tangent of the branch, which is not loaded, and one mode, which is.
         """
-        trial, modes = found.trial, list(finding_of(found.details).arrays.get("kernel", ()))
+        trial, modes = found.trial, list(getattr(found.details, "kernel", ()))
         known = trial.newton_error + (self.tolerance if math.isnan(error) else error)
         loads = list(phase_loads(trial.system, trial.x, modes, known))
         is_made = found.label == Label.BRANCH_POINT and len(modes) == 2 and {is_mode for *_, is_mode in loads} == {True}

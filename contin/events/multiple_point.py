@@ -14,7 +14,9 @@ are tangents.
 
 from __future__ import annotations
 
+import functools
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -78,11 +80,17 @@ class MultiplePoint(Finding):
     dimension: int
     kernel: Array
     x: Array | None = None
-    tangents: tuple[Array, ...] = ()
-    continuum: bool = False
+    leave: Callable[[], tuple[tuple[Array, ...], bool]] = lambda: ((), False)  # both of these are computed when asked for
     spread: float = 0.0
     is_branch_point: ClassVar[bool] = True
     has_equations: ClassVar[bool] = True
+
+    _left = functools.cached_property(lambda self: self.leave())
+    tangents, continuum = property(lambda self: self._left[0]), property(lambda self: self._left[1])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all is computed."""
+        return {**vars(self), "leave": None, "_left": self._left}
 
     @property
     def is_lost(self) -> bool:  # type: ignore[override]
@@ -231,17 +239,23 @@ def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> Mult
     home = row / system.weights
     along = np.array([inner(system, vector, home) for vector in basis])
     ours = along @ basis / np.linalg.norm(along)
-    directions, continuum = _branch_directions(manifold, s) if system.may_branch(x) else ([], False)
-    tangents = []
+    across = canonical_basis(np.linalg.svd(along[None])[2][1:] @ basis, system.weights)
+    a = manifold.phi @ (system.weights * ours)
+    spread = max(_spread(G, slopes, a), _spread_on_branch(manifold, s, a))
+    return MultiplePoint(manifold.d, across, x, functools.partial(_branches, manifold, s, vectors, ours), spread)
+
+
+def _branches(manifold: _Manifold, s: Array, vectors: Array, ours: Array) -> tuple[tuple[Array, ...], bool]:
+    """Return the tangents of the branches, first ``ours``, with the derivatives of x; and whether they form a continuum."""
+    system, tangents = manifold.system, []
+    with np.errstate(all="ignore"):
+        may_branch = system.may_branch(manifold.at(s)[0])
+        directions, continuum = _branch_directions(manifold, s) if may_branch else ([], False)
     for a in [] if continuum else directions:
         tangent = a @ vectors
         tangents.append(oriented(tangent / np.sqrt(inner(system, tangent, tangent))))
     cosines = [inner(system, tangent, ours) for tangent in tangents]
-    tangents = [oriented_along(tangents[i], cosines[i]) for i in ordered(tangents, cosines)] or [ours]
-    across = canonical_basis(np.linalg.svd(along[None])[2][1:] @ basis, system.weights)
-    a = manifold.phi @ (system.weights * ours)
-    spread = max(_spread(G, slopes, a), _spread_on_branch(manifold, s, a))
-    return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum, spread)
+    return tuple(oriented_along(tangents[i], cosines[i]) for i in ordered(tangents, cosines)) or (ours,), continuum
 
 
 def _spread(G: Array, slopes: Array, a: Array) -> float:

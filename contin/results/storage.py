@@ -293,7 +293,8 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
     elif row.get("dimension") is not None:
         kernel, tangents = arrays[f"kernel{number}"], tuple(arrays[f"tangents{number}"])
-        details = MultiplePoint(row["dimension"], kernel, x, tangents, row["continuum"], row.get("spread", 0.0))
+        left = tangents, row["continuum"]
+        details = MultiplePoint(row["dimension"], kernel, x, lambda: left, row.get("spread", 0.0))
     elif row.get("corner") is not None:
         details = Corner(row["corner"], tuple(arrays[f"tangents{number}"]), tuple(row["unstable"]))
     elif row.get("touch") is not None:
