@@ -36,7 +36,8 @@ def push(strip: Strip, distance: float, ends: str = "clamped", at: float = 0.5) 
     if not low <= distance < strip.length:
         raise ValueError(f"--distance: {distance:g} m must be from {low:g} m to below the length, {strip.length:g} m")
     sizes: dict = {name: getattr(strip, name) for name in ("width", "thickness", "length", "poisson_ratio", "youngs_modulus")}
-    follow = {"follow": "roller", "to": -distance / 2, "limits": {"roller": [-strip.length / 2, strip.length / 2]}}
+    limits, at_none = {"roller": [-strip.length / 2, strip.length / 2]}, {"F_roller": [0]}
+    follow = {"follow": "roller", "to": -distance / 2, "limits": limits, "label": at_none}
     scene = parse(json.dumps({
         "material": {}, "dimensions": sizes, "start": ends, "finish": ends, "begin": "arch", "roller": {"at": at},
         "steps": {"angle": 0.1}, "numbers": {"distance": distance}, "stages": [follow, follow | {"start_at": "BP 1"}],
@@ -45,17 +46,18 @@ def push(strip: Strip, distance: float, ends: str = "clamped", at: float = 0.5) 
     stage = OpenStage(scene, 1)
     run = iter(stage.start())
     while (point := next(run, None)) is not None:
-        bent, force = stage.strip.strains(point.system, point.x) / (2 * np.pi), stage.found(point)["F_roller"]
+        bent = stage.strip.strains(point.system, point.x) / (2 * np.pi)
+        force = 0.0 if point.label == Label.USER_ZERO else stage.found(point)["F_roller"]
         pieces[-1].append([point.arclength, point["roller"], -force, strip.strain(bent[:, 0], bent[:, 2]).max()])
         if point.label == Label.BRANCH_POINT and stage.number == 1 and point.index_change == (0, 1):
             stage, pieces = OpenStage(scene, 2), [*pieces, []]
             run = iter(stage.start([[point]]))
-        elif point.index or (pushes and force > 0):
+        elif point.index or (pushes and force >= 0):
             end = "the strip becomes unstable" if point.index else "the strip leaves it"
             break
         pushes = pushes or force < 0
     _, roller, force, strains = np.hstack([smooth(s, s, *rest) for s, *rest in (np.transpose(one) for one in pieces if one)])
-    pushing = force > 0
+    pushing = force >= 0
     table = roller[pushing] * scene.factor("roller"), force[pushing] * scene.factor("F_roller"), strains[pushing]
     (a, b), (f, g) = table[0][:2], table[1][:2]
     touches = a - f * (b - a) / (g - f)  # the first guess has a small force

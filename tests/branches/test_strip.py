@@ -298,7 +298,7 @@ def test_which_law_holds():
 def test_the_pages_numbers_are_the_commands(root, capsys):
     page = (root / "docs" / "strips.md").read_text(encoding="utf-8")
     examples = re.findall(r"```console\n\.venv/bin/ribbon strip (.*?)\n(.*?)```", page.replace("\\\n", ""), re.S)
-    assert len(examples) == 4
+    assert len(examples) == 5
     for arguments, printed in examples:
         assert main(shlex.split(arguments)) == 0
         assert capsys.readouterr().out.split() == printed.split()
