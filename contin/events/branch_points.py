@@ -34,6 +34,9 @@ _GAP = 1e-2
 _GAP_WITHOUT_MESH = 1e-5
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is not located.
 _HALVINGS = 12
+#: And how often between two calls of the locator, which takes as long as many halvings where it fails: on a curve in two
+#: parameters each of its updates differentiates the equations twice, numerically.
+_BETWEEN = 3
 #: The smallest singular value is smaller by far than the next one if their quotient is above this. In layers whose steps were
 #: divided it is 77 and more; three times larger, the first of these are divided again.
 _BY_FAR = 30.0
@@ -169,28 +172,33 @@ class BranchPointSearch:
     def simple(self) -> SpecialPoint:
         """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
         arc = self.arc
-        state, trial, step = arc.state, arc.trial, arc.step
-        low, high, largest = arc.low, step, _GAP if state.system.intervals else _GAP_WITHOUT_MESH
+        low, high = arc.low, arc.step
         middle = low + self._share * (high - low)
-        for _ in range(_HALVINGS):
-            try:
-                found, system = self._near(middle)
-                x = found.x if system is state.system else system.carrier(state.system)(found.x)
-                at = inner(state.system, state.tangent, x - state.x)
-                inside = arc.low - APART * step <= at <= step * (1 + APART)
-                if inside and found.gap < largest and arc.passes_by(x, at):
-                    direction = arc.direction(at) if system is state.system else state.system.carrier(system)(arc.direction(at))
-                    found = found.along(system, direction)
-                    return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(system, found.x), details=found)
-            except ConvergenceError:
-                pass
+        for number in range(_HALVINGS + 1):
+            if number % _BETWEEN == 0:
+                with contextlib.suppress(ConvergenceError):
+                    if (point := self._located(middle)) is not None:
+                        return point
             try:
                 changes = self._changes_up_to(arc.at(middle))
             except ConvergenceError:
                 break
             low, high = (low, middle) if changes else (middle, high)
             middle = (low + high) / 2
-        return SpecialPoint(high, Label.BRANCH_POINT, "", trial, is_located=False)
+        return SpecialPoint(high, Label.BRANCH_POINT, "", arc.trial, is_located=False)
+
+    def _located(self, middle: float) -> SpecialPoint | None:
+        """Return the branch point near a place if it lies inside the step; raises ConvergenceError where there is none."""
+        arc, state = self.arc, self.arc.state
+        found, system = self._near(middle)
+        x = found.x if system is state.system else system.carrier(state.system)(found.x)
+        at = inner(state.system, state.tangent, x - state.x)
+        inside = arc.low - APART * arc.step <= at <= arc.step * (1 + APART)
+        if not (inside and found.gap < (_GAP if state.system.intervals else _GAP_WITHOUT_MESH) and arc.passes_by(x, at)):
+            return None
+        direction = arc.direction(at) if system is state.system else state.system.carrier(system)(arc.direction(at))
+        found = found.along(system, direction)
+        return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(system, found.x), details=found)
 
     def _near(self, at: float) -> tuple[BranchPoint, Any]:
         """Return the branch point near a place and its system: where conditions switch, on a mesh with frozen outcomes."""
