@@ -44,7 +44,6 @@ def main(argv=None) -> int:
 
 
 def _of_closed_strips(graph, options) -> Iterable[str]:
-    """Yield what is asked of a diagram of closed strips."""
     if "source" in graph.graph:
         yield graph.graph["source"]
     if options.where:
@@ -78,7 +77,6 @@ def _folds(graph, low: float, high: float) -> Iterable[str]:
 
 
 def _states(graph, options) -> Iterable[str]:
-    """Yield the states at a natural curvature."""
     from branches.graph.at_value import states_at  # Newton's method: not for other questions
 
     folder = Path(options.folder)

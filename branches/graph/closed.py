@@ -158,7 +158,6 @@ def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -
 
 
 def _node_of(event, family, branch, origin: str = ""):
-    """Return the node of a labelled point of a branch file."""
     values = {column: float(event[column]) for column in branch.columns.mapped("kappa_n")}
     values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
     kind = kind_of(event["label"].decode(), values["what"], branch.reason, "origin" in family)

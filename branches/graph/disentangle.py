@@ -194,7 +194,6 @@ def _crossed_each(courses) -> np.ndarray:
 
 
 def _grouped(keys, values) -> dict:
-    """The values of each key, as arrays."""
     order = np.argsort(keys, kind="stable")
     known, first = np.unique(keys[order], return_index=True)
     return dict(zip(known.tolist(), np.split(values[order], first[1:])))

@@ -108,6 +108,5 @@ def _resampled(axes, x, y) -> np.ndarray:
 
 
 def _grid(box) -> np.ndarray:
-    """Pixels over a box."""
     x, y = (np.linspace(low, high, max(2, int((high - low) / _ROOM))) for low, high in box.get_points().T)
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

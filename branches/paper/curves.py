@@ -74,7 +74,6 @@ def curves(folder: Path) -> Section:
 
 
 def _first_fold(law: Law, m: int, n: int, parameters, intervals: int) -> Point:
-    """Return the first fold of a primary branch."""
     system, x, tangent = primary_branch(law, m, n, parameters, intervals, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-100, 100)})
     return trace(point_of(system, x), settings, tangent=tangent, progress=False).labelled(Label.FOLD)[0]

@@ -114,7 +114,6 @@ def _with_stability(scene, path):
 
 
 def _tell_barriers(path, display, quiet: bool) -> None:
-    """Print the barriers of the stable states of an open strip."""
     from threadpoolctl import threadpool_limits
 
     from branches.run.barriers import report

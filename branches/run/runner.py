@@ -219,7 +219,6 @@ def _image(points: list[Point]) -> bytes:
 
 
 def _points(problem, image: bytes) -> list[Point]:
-    """Return the points of an `_image`."""
     from contin import load
 
     with tempfile.TemporaryDirectory() as folder:

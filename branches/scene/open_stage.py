@@ -172,7 +172,6 @@ class OpenStage(Stage):
         return run
 
     def _begun(self, origin: Point) -> Continuation:
-        """Return the run of a stage from a point."""
         stage, strip, waves = self.stage, self.strip, getattr(self.stage, "phase", None)
         if waves is not None and origin.system.problem is not self.problem:
             try:
@@ -225,7 +224,6 @@ class OpenStage(Stage):
         return {name: tuple(end / self.scene.factor(name) for end in ends) for name, ends in self.stage.limits.items()}
 
     def _settings(self, system: Collocation, x: np.ndarray) -> Settings:
-        """Return the settings of a stage that starts at a state."""
         stage, steps = self.stage, self.scene.steps
         here = system.parameter(x, stage.follow)
         to = stage.to / self.scene.factor(stage.follow)

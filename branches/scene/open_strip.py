@@ -574,7 +574,6 @@ def numbers_of(what: str, values: dict[str, Any]) -> dict[str, float]:
 
 
 def _stage_in_si_units(stage: object) -> Any:
-    """Return the fields of a stage with its numbers in SI units."""
     if not isinstance(stage, dict):
         return stage
     read = {part: _in_si_units(part, stage[part]) for part in ("numbers", "limits", "label") if part in stage}

@@ -41,11 +41,9 @@ class OpenBranch(StoredBranch):
         return self.shape_at(point, *self.states_at(point))[1]
 
     def _strip(self, point: int) -> Network:
-        """Return the mechanics of the stage of a point."""
         return self.scene.strip(int(self.points["stage"][point]))
 
     def _numbers(self, point: int) -> dict[str, float]:
-        """Return the values of all numbers of the strip at a point."""
         row, names = self.points[point], self.points.dtype.names
         return {name: float(row[name]) if name in names else 0.0 for name in self._strip(point).problem.parameters}
 

@@ -88,7 +88,6 @@ def _check(asked: dict, natural_radius: float | None) -> None:
 
 
 def _answer(strip: Strip, asked: dict) -> None:
-    """Write what is asked for."""
     from threadpoolctl import threadpool_limits
 
     from branches.strip import report  # .5 s: not for a mistake in the dimensions

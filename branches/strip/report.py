@@ -47,7 +47,6 @@ def deviations(strip: Strip) -> dict[str, float]:
 
 
 def _law(strip: Strip) -> str:
-    """Return the law that holds, in words."""
     off = deviations(strip)
     nearer = min(off, key=off.get)
     others = ", ".join(

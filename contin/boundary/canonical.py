@@ -185,7 +185,6 @@ class _Inside:
         return _called(self.tape, what, function, [self.t, *given], count)
 
     def _slopes(self, value: Number, by: Sequence[Number]) -> list[Number]:
-        """Return the gradient of a value."""
         return _derivatives(self.tape, [value], by)[0]
 
     def _from_hamiltonian(self) -> None:
@@ -233,7 +232,6 @@ class _Inside:
         return self.tape.reading([value.place], [each.place for each in sources])[value.place]
 
     def _controlled(self, values: Sequence[Number]) -> list[Number]:
-        """Return values at the controls."""
         return [Number(self.tape, place) for place in self.tape.substitute([each.place for each in values], self._known)]
 
     def _check(self, second: Sequence[Sequence[Number]]) -> None:
@@ -303,7 +301,6 @@ _PROBES = (0.5, 1.5, -0.5, 0.1)
 
 
 def _pivots(second: Sequence[Sequence[Number]]) -> list[Number]:
-    """Return the pivots of a symmetric matrix."""
     a, pivots = [list(row) for row in second], []
     for i in range(len(a)):
         pivots.append(a[i][i])

@@ -92,7 +92,6 @@ def oscillating(field: BoundaryValueProblem, phase: Mapping[int, tuple[Any, Any]
 
 
 def _phase_condition(phase: Mapping[int, tuple[Any, Any]], count: int, times: int) -> Function:
-    """Return the integrand of the phase condition."""
     waves = [(math.cos(2 * math.pi * j / times), math.sin(2 * math.pi * j / times)) for j in range(times)]
 
     def integrals(t: float, u: Named, p: Named) -> Any:

@@ -243,7 +243,6 @@ class BoundaryValueProblem(Restated):
         return lines[:-count], {name: f" + {rate}" for name, rate in zip(self.rates, lines[-count:])}
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         point, u = self._of_point.arguments, self.state_names
         ends, rates = self._of_ends.arguments, [None, u, u, tuple(self.parameters)]
         return {"rhs": point, "boundary": ends, "integrals": point, "functionals": point, "rates": rates}
@@ -488,7 +487,6 @@ class SegmentedProblem(InSegments, BoundaryValueProblem):
         )  # fmt: skip
 
     def _signatures(self) -> Mapping[str, Any]:
-        """Return the arguments of the functions."""
         names, parameters = [piece.names for piece in self.pieces], tuple(self.parameters)
         found: dict[str, Any] = {"boundary": [names, names, parameters]}
         for number, piece in enumerate(self.pieces):

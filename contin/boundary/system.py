@@ -252,7 +252,6 @@ class Collocation(Composed):
         """Take x as the reference."""
 
     def _referring_to(self, x: Array) -> Self:
-        """Return the same with x as the reference."""
         other = self._copied()
         other._refer(x)
         return other
@@ -370,7 +369,6 @@ class Collocation(Composed):
 
     @functools.cached_property
     def _boundary(self) -> Batch:
-        """Boundary conditions, compiled."""
         return self._frozen("boundary", self._batch("boundary", ("boundary",)))
 
     _functions = "field", "boundary"

@@ -189,7 +189,6 @@ class VariationalProblem(BoundaryValueProblem):
         )  # fmt: skip
 
     def _sized(self, sizes: Mapping[str, float]) -> dict[str, float]:
-        """Return the sizes that are given, checked."""
         found: dict[str, float] = {}
         for name, size in checks.mapping("sizes", sizes, "positive numbers").items():
             checks.chosen("sizes", [name], (*self.state_names, *self.parameters, "sigma"))
@@ -199,7 +198,6 @@ class VariationalProblem(BoundaryValueProblem):
         return found
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         v = self.variation
         inside: Arguments = [None, v.states, v.controls, v.parameters]
         ends: Arguments = [v.states, v.states, v.parameters]
@@ -482,7 +480,6 @@ class SegmentedVariationalProblem(InSegments, VariationalProblem):
         self._keep(sizes=self._sized(sizes or {}))
 
     def _signatures(self) -> Mapping[str, Any]:
-        """Return the arguments of the functions."""
         states, parameters = [tuple(segment.states) for segment in self.segments], self.variation.parameters
         found: dict[str, Any] = dict.fromkeys(("ends", "end_energy"), [states, states, parameters])
         found["end_work"] = [*[states] * 4, parameters]

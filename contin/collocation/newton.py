@@ -188,7 +188,6 @@ def _factor(mesh, room, matrix, around):
 
 @helper
 def _solve(mesh, room, matrix):
-    """Solve for the right-hand side at hand."""
     solve(mesh.layout, matrix.factors, room.right, room.update, matrix.work, mesh.whole)
 
 

@@ -72,7 +72,6 @@ def frozen(state: State) -> State:
 
 
 def _with_sign(state: State) -> State:
-    """Return a state with the sign of its determinant."""
     return dataclasses.replace(state, sign=state.system.linearize(state.x, (state.row,))[1].sign)
 
 

@@ -43,7 +43,6 @@ from contin.linalg.ends import Relations, divide_ends, relate_ends
 
 @helper
 def _product(row: Array, x: Array) -> float:
-    """Return the product of a row and the first unknowns."""
     total = 0.0
     for i in range(row.size):
         total += row[i] * x[i]

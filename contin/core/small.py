@@ -225,7 +225,6 @@ def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, 
 
 @helper
 def _fill_tangent(equations: Equations, linear: Linear, tangent: Array) -> None:
-    """Fill in the unit tangent from the factors."""
     size = tangent.size
     for i in range(size):
         tangent[i] = 1.0 if i == size - 1 else 0.0

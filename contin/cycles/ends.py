@@ -302,7 +302,6 @@ def hopf_point_ahead(system: CycleCollocation, state: State, step: float) -> Spe
 
 
 def _end(system: CycleCollocation, at: float, x: Array, frequency: float, error: Array) -> SpecialPoint:
-    """Return the end of a branch at a Hopf point."""
     stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
     sizes = dict(zip(system.free, map(float, error * system.free_scales)))

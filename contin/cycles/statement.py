@@ -248,7 +248,6 @@ class CycleProblem(BoundaryValueProblem):
         return {name: value for name, value in self.parameters.items() if name not in own}
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         stated, every = tuple(self._given), tuple(self.parameters)
         of_field, of_means = (Signature(self.state_names, p, times=self.period is not None).arguments for p in (stated, every))
         return {"field": of_field, "functionals": of_means, "period": [stated]}
@@ -575,7 +574,6 @@ class MapProblem(AlgebraicProblem):
             check_periodic("map", self.batch("map"), self.angles, self.parameters, lifts=True)
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         return {"map": self._signature.arguments, "functionals": self._signature.arguments}
 
     def _compiled(self, name: str) -> Batch:

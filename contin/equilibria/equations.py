@@ -177,7 +177,6 @@ class Algebraic(Spectral, Composed):
 
     @property
     def _rows(self) -> tuple[tuple[str, int], ...]:
-        """The residual's."""
         return (("residual", self.problem.equation_size),)
 
     @property
@@ -234,7 +233,6 @@ class Algebraic(Spectral, Composed):
 
     @functools.cached_property
     def _residual(self) -> Batch:
-        """The residual, compiled."""
         return self._frozen("residual", self._batch("residual", ("residual",)))
 
     @functools.cached_property

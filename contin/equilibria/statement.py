@@ -147,7 +147,6 @@ class AlgebraicProblem(Restated):
         return cast(tuple[str, ...], self.states)
 
     def _signatures(self) -> Mapping[str, Arguments]:
-        """Return the arguments of the functions."""
         return {"residual": self._signature.arguments, "functionals": self._signature.arguments}
 
     @property
@@ -337,7 +336,6 @@ class ReducedProblem(AlgebraicProblem):
                 raise ProblemError(f"residual: {what}, where the rate of {state} is {rates[place]:.6g}; give another guess")
 
     def _states(self, u: Array, totals: Array) -> Array:
-        """Return all states."""
         return self._follow @ np.append(u, totals)
 
     @property

@@ -111,7 +111,6 @@ def _along(factors: Callable[[float], Factors], start: float, end: float, halvin
 
 
 def _is_condensed(factors: object) -> bool:
-    """Return whether a matrix has been condensed."""
     return isinstance(factors, Factorization) and factors.ends is not None
 
 

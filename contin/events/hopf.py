@@ -175,7 +175,6 @@ def _nearest_pairs(gaps: Array) -> tuple[Indices, Indices]:
 
 
 def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
-    """Return the Hopf points between two places."""
     first, last = _changes(left[1], right[1])
     one, other = _half_plane(first), _half_plane(last)
     if not (np.any(one) or np.any(other)):

@@ -468,7 +468,6 @@ def _give_up(work, lists, row, lanes):
 
 @instruction
 def _address(builder: Builder, array: Any, offset: int) -> int:
-    """Return an address in an array."""
     return builder.add(array.address, offset)
 
 

@@ -434,7 +434,6 @@ def _lines(tape: Tape, places: Sequence[int], labels: Mapping[int, str]) -> list
 
 
 def _text(operation: Operation, operands: list[_Text]) -> _Text:
-    """Return the text of an operation, of those of its operands."""
     name, data = operation.name, operation.data
     plain = [text for text, _ in operands]
     if name == "constant":

@@ -205,7 +205,6 @@ class _Library(JITCodeLibrary):
     """A module that numba makes. It is not optimized with all that it calls before that is part of a kernel."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Optimize each function."""
         ll_module.data_layout = self._codegen._data_layout
         passes, builder = self._codegen._function_pass_manager()
         for function in ll_module.functions:

@@ -101,7 +101,6 @@ def _archive(head: dict[str, Any], arrays: dict[str, Any]) -> bytes:
 
 
 def _image(branch: Branch) -> bytes:
-    """Return the file of a branch."""
     if not branch.points:
         raise ProblemError("branch: has no points")
     first: Any = branch.points[0].system

@@ -319,7 +319,6 @@ def _are_many(system: System, x: Array, rank: _Rank) -> bool:
 
 
 def _beside(system: System, x: Array) -> Iterator[Array]:
-    """Return places around x."""
     random = draws.generator("failure of solve")
     for sign in np.repeat((1.0, -1.0), draws.PLACES):
         yield x + sign * draws.ASIDE * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)

@@ -98,7 +98,6 @@ def batch(
 
 
 def _rows(function: Callable[..., Any], problem: object, job: Sequence[Mapping[str, float]]) -> list[Row]:
-    """Return the rows of some sets of values."""
     rows = []
     for values in job:
         try:

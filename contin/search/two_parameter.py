@@ -444,7 +444,6 @@ def _holding(start: Point, column: str) -> Point:
 
 
 def _value(start: Point, base: System, x: Array) -> _First:
-    """The value of a column."""
     column, value = start.column, start.value
     assert value is not None
     known = base.column_gradient(x, column) is not None
