@@ -184,12 +184,6 @@ def rotation_conditions(end: End) -> Callable[..., tuple]:
     return lambda q, q1: (along(end.axis, _turned(end.director, relative(q, q1))),)
 
 
-def place_conditions(end: End) -> Callable[..., tuple]:
-    """Return ``conditions(r, r1)``, what vanishes for the place r of an end whose prescribed place is r1."""
-    held = end.held
-    return lambda r, r1: tuple(along(vector, [a - b for a, b in zip(r, r1)]) for vector in held)
-
-
 def angle_of(end: End) -> Callable[..., float] | None:
     """Return ``angle(q, q1)``: by how much an end has turned about the axis of its hinge or joint; None without one."""
     axis = end.axis

@@ -139,8 +139,3 @@ def moment_of(q, lam) -> list:
     """Return the same as a list of components, of numbers of any kind."""
     rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
     return [sum(a * b for a, b in zip(lam, rate)) for rate in rates]
-
-
-def moment_on_axes(q, lam) -> np.ndarray:
-    """Return the moment on the lab axes from the multipliers of the quaternion."""
-    return moment_on_directors(q, lam) @ np.array(directors(*q)).reshape(3, 3)

@@ -16,7 +16,7 @@ from contin import Point
 from contin.lowlevel import Collocation, Continuation
 from ribbon_model import law_end
 from ribbon_model.ends import Vector
-from ribbon_model.equilibrium import CENTRELINE, FRAME, moment_on_axes, strains_of
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_directors, strains_of
 from ribbon_model.members import START, JointEnd, numbers_of
 from ribbon_model.section import KINDS, NATURAL, Section
 from ribbon_model.shape import Shape, shape_of
@@ -166,7 +166,8 @@ class States(Statement):
         side, centre = self._outline[0].get(each.member, (0, row[4:7]))
         pressure = point.parameters.get("pressure", 0.0) * self._part(SimpleNamespace(**point.parameters))
         fan = side * pressure * np.cross(row[4:7] - centre, self.pressure_normal)
-        return sign * (row[11:14] + fan / 2), sign * moment_on_axes(row[:4], row[7:11]), row[4:7]
+        moment = moment_on_directors(row[:4], row[7:11]) @ np.array(directors(*row[:4])).reshape(3, 3)
+        return sign * (row[11:14] + fan / 2), sign * moment, row[4:7]
 
     def place(self, point: Point, joint: str) -> np.ndarray:
         """Return the place (3,) of a joint."""

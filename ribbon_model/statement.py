@@ -420,7 +420,10 @@ class Statement:
                 place = [x + getattr(p, number) * part for x, part in zip(place, direction)]
             return place
 
-        return frame_of, place_of, ends.rotation_conditions(end), ends.place_conditions(end)
+        def place_conditions(r, r1):
+            return tuple(ends.along(vector, [a - b for a, b in zip(r, r1)]) for vector in end.held)
+
+        return frame_of, place_of, ends.rotation_conditions(end), place_conditions
 
     def _from(self, joint: str) -> tuple[Sequence[float], Sequence[tuple[str, Vector]]]:
         """Return the place from which displacements of a joint count, and the strokes that add to them."""

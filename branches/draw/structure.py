@@ -125,11 +125,6 @@ def parts_of(shape: Shape | Structure) -> tuple[Shape, ...]:
     return shape.parts if isinstance(shape, Structure) else (shape,)
 
 
-def fixtures_of(shape: Shape | Structure) -> tuple[Fixture, ...]:
-    """Return the joints, supports and forces of a structure; a strip alone has none."""
-    return shape.fixtures if isinstance(shape, Structure) else ()
-
-
 def solids_of(shape: Shape | Structure, width: float) -> list[tuple[Fixture, Mesh]]:
     """Return the joints, supports and forces of a structure with their solids; a strip alone has none."""
     return shape.solids(width) if isinstance(shape, Structure) else []

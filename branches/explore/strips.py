@@ -19,7 +19,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from branches.draw.strip import steady
-from branches.draw.structure import Fixture, fixtures_of, parts_of
+from branches.draw.structure import Fixture, Structure, parts_of
 from branches.explore.packing import column, compressed
 from branches.explore.profiles import MOST_NODES, marked
 from branches.run.barriers import falls, told
@@ -320,7 +320,8 @@ def _stages(
     for number in np.unique(branch.stage_of):
         first = next(shape for point, shape in shapes.items() if branch.stage_of[point] == number)
         about = _stage(path, branch, int(number), columns, snaps) | {"shapes": compressed(states[branch.stage_of == number])}
-        yield about | {"fixtures": [_fixture(branch, int(number), one, unit) for one in fixtures_of(first)]}
+        fixtures = first.fixtures if isinstance(first, Structure) else ()  # a strip alone has none
+        yield about | {"fixtures": [_fixture(branch, int(number), one, unit) for one in fixtures]}
 
 
 def _fixture(branch: StoredBranch, stage: int, one: Fixture, unit: float) -> dict:

@@ -19,7 +19,7 @@ from branches.graph.stored import read
 from branches.paper.page import BUCKLED, STABLE, Row, Section, keep, new_figure
 from branches.run.display import Display
 from branches.run.many import run_many
-from branches.run.runner import whole_branch
+from branches.run.runner import run_scene
 from branches.scene.parse import parse
 from branches.store.read import read_branch
 from ribbon_model import exact
@@ -44,7 +44,8 @@ COVERINGS, WINDOW = (1, 3, 5, 7), (-8.0, 14.0)
 def fig11(folder: Path) -> Section:
     """The branch (1, 2) by collocation, with shapes along it."""
     path = folder / "fig11.h5"
-    whole_branch(parse(FIG11, "fig11"), path, Display(silent=True))
+    if run_scene(parse(FIG11, "fig11"), path, Display(silent=True), overwrite=True) == "interrupted":
+        raise KeyboardInterrupt
     branch = read_branch(path)
     start, fold, end = branch.events["kappa_n"]
     star = branch.events["kappa_star"]

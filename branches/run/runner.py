@@ -81,9 +81,10 @@ class Computed:
 
     def branch(self) -> StoredBranch:
         """Return the branch without its solutions, as its file gives it."""
-        from branches.store.read import computed_branch  # 6 ms, which a run to a file does not need
+        from branches.store.read import class_of  # 6 ms, which a run to a file does not need
 
-        return computed_branch(self.scene, (self.status, self.stop, self.reason), self.points, self.events, self.notes)
+        ended, none = (self.status, self.stop, self.reason), np.empty(0)  # without solutions
+        return class_of(self.scene)(self.scene, *ended, self.points, self.events, none, none, none, tuple(self.notes))
 
     def __repr__(self) -> str:
         return f"Computed({len(self.points)} points, {len(self.events)} of them labelled, {self.status}; {self.stop})"
@@ -96,15 +97,6 @@ def compute_scene(scene: Scene, display: Display) -> Computed:
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""
         return Computed(writer.image(), outcome, str(stop or ""), reason, scene, writer.points(), writer.events(), writer.notes)
-
-
-def whole_branch(scene: Scene, path: Path, display: Display) -> None:
-    """Follow the branch of ``scene`` into the file ``path``; errors as of `run_scene`.
-
-    Raises KeyboardInterrupt where the run was interrupted; the file holds the points before.
-    """
-    if run_scene(scene, path, display, overwrite=True) == "interrupted":
-        raise KeyboardInterrupt
 
 
 @dataclasses.dataclass(eq=False, repr=False)

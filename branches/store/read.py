@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import h5py
-import numpy as np
 
 from branches.scene.fields import ConfigError, Scene
 from branches.scene.parse import parse
@@ -36,28 +34,20 @@ def read_kind(path: str | Path, kind: str) -> StoredBranch:
     return branch
 
 
-def computed_branch(
-    scene: Scene, ended: tuple[str, str, str], points: np.ndarray, events: np.ndarray, notes: Iterable[str]
-) -> StoredBranch:
-    """Return a branch from the tables of its run, without its solutions; ``ended`` is status, stop and reason."""
-    none = np.empty(0)
-    return _class_of(scene)(scene, *ended, points, events, none, none, none, tuple(notes))
-
-
 def _branch(file: h5py.File, name: str) -> StoredBranch:
     solutions, attributes = file["solutions"], file.attrs
     try:
         scene = parse(attributes["config"], name)
     except ConfigError as error:
         raise StoreError(f"cannot read {name!r}: its scene is unknown ({error})") from error
-    return _class_of(scene)(
+    return class_of(scene)(
         scene, attributes["status"], attributes["stop"], attributes["stop_reason"], file["points"][:],
         file["events"][:], solutions["index"][:], solutions["t"][:], solutions["states"][:],
         tuple(str(attributes.get("notes", "")).splitlines()),
     )  # fmt: skip
 
 
-def _class_of(scene: Scene) -> type[StoredBranch]:
+def class_of(scene: Scene) -> type[StoredBranch]:
     """Return the class of results of a kind of strip; open and closed strips need mechanics that the others do not."""
     if scene.KIND == CLOSED:
         from branches.store.closed_branch import ClosedBranch

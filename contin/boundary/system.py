@@ -22,7 +22,7 @@ from contin.boundary.grazing import contradiction, grazing, jumping, touch_ahead
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
-from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near, with_breaks
+from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near
 from contin.collocation.newton import Values, Workspace, linearize_on_mesh, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
@@ -714,10 +714,6 @@ class Collocation(Composed):
         if mesh is None and (not known.size or np.abs(x - known).max() <= APART * np.abs(x).max()):
             return None
         return (self._referring_to(x), np.array) if mesh is None else self.on_mesh(mesh, x)
-
-    def on_breaks(self) -> Self:
-        """Return the same problem on a mesh of as many intervals, with the breaks among its points."""
-        return self.on_mesh(with_breaks(self.mesh, self.breaks))[0] if len(self.breaks) else self
 
     def on_switches(self, x: Array, closely: bool = False) -> tuple[Self, Carrier] | None:
         """Return the same on a mesh with the places of `switching` among its points; None where they are already.

@@ -99,7 +99,8 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> fl
             return 0.0
         if done == one_call.FAILED and report[one_call.UPDATES + int(report[one_call.ITERATIONS]) - 1] <= STAGNANT:
             return 0.0
-        if done == one_call.CONVERGED and not _has_collapsed(amplitude, x, new):
+        low = COLLAPSED * abs(_product(amplitude, x))  # below it a cycle has become an equilibrium, as in `collapsed`
+        if done == one_call.CONVERGED and not (amplitude.size > 0 and abs(_product(amplitude, new)) < low):
             outcome = rules.judge(frame, attempt, control, path, number, step)
         if outcome == BELIEVED:
             break
@@ -112,12 +113,6 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> fl
         return -step
     rules.accept(frame, attempt, control, path, number, step)
     return -step if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
-
-
-@helper
-def _has_collapsed(amplitude: Array, x: Array, new: Array) -> bool:
-    """Return whether a cycle has become an equilibrium, as a system of cycles says in `collapsed`."""
-    return amplitude.size > 0 and abs(_product(amplitude, new)) < COLLAPSED * abs(_product(amplitude, x))
 
 
 @kernel(reorder=False, last=True)

@@ -118,11 +118,6 @@ def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
     return f"no mesh has a point where {where}: from there on the points are as exact as discretization_error says"
 
 
-def why_lost(trial: Trial, is_located: bool) -> str:
-    """Return why a special point has no label: a clause."""
-    return "was not found again on a finer mesh" if is_located else "was bracketed, and not located"
-
-
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
 
@@ -153,7 +148,8 @@ def is_confirmed(point: SpecialPoint, arc: Arc, notes: Notes) -> bool:
         if point.stop is None and unknown:
             notes.add(f"{what} at {notes.place(point.trial)}: its ± is nan, since Newton's method failed at the second look")
         return True
-    notes.inside(f"a possible {what} {why_lost(point.trial, point.is_located)}", arc)
+    why = "was not found again on a finer mesh" if point.is_located else "was bracketed, and not located"
+    notes.inside(f"a possible {what} {why}", arc)
     return False
 
 

@@ -35,7 +35,7 @@ from contin.core.small import FAILED
 from contin.core.step import CLEAR, Reason, State, Stop, settled, trial_of
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError, Grazing
-from contin.events.arc import Arc, SpecialPoint, with_details
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.corner import Way, changed_between, conditions, corner_at, hit_of, on_mesh_of, refrozen
 from contin.events.folds import STILL
 from contin.events.inspection import Start
@@ -262,7 +262,8 @@ class Continuation:
                 point, behind = self._grazed(point, arc, any(each.label == Label.FOLD for each in found))
             if point.stop is not None:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
-                point = with_details(point, self.stop)
+                if self.stop.details and isinstance(point.details, (dict, type(None))):  # no details of another kind
+                    point = dataclasses.replace(point, details={**(point.details or {}), **self.stop.details})
             if point.label != Label.BRANCH_POINT or not self._notes.phases(point, self._accuracy.error):
                 yield self._point(point, arc.state, change)
             if self.go_on(None if behind is None else (behind, None)) or self.stop is not None:

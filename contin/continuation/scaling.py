@@ -448,7 +448,8 @@ class _FirstPoint:
         finer = None if system.refined() is None else on_finer_mesh(Trial(system, x, self.linear), self._newton)
         if finer is not None:
             on: Any = finer.system
-            carry, rate = system.carrier(on), finer.tangent[on.parameter_index(self._primary)] or 1.0
+            primary = on.parameter_index(system.free[at - system.state_size])
+            carry, rate = system.carrier(on), finer.tangent[primary] or 1.0
             error = np.maximum(error, 2 * on.largest(finer.x - carry(x)))
             turned = finer.tangent / rate - carry(self.tangent)
             error_of_tangent = np.maximum(error_of_tangent, 2 * on.largest(turned))
@@ -458,10 +459,6 @@ class _FirstPoint:
             error = np.fmax(error, system.largest(move))
             error_of_tangent = np.fmax(error_of_tangent, system.largest(turned - self.tangent))
         return error, error_of_tangent
-
-    @property
-    def _primary(self) -> str:
-        return self.system.free[self.place - self.system.state_size]
 
     def _rounded(self, v: Array) -> Array:
         """Return a vector changed by one unit in the last place, up or down."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from contin.arrays import Array
 from contin.continuation.rules import JUMPS, Judgement, aims, judged, predict
 from contin.core.settings import Settings
 from contin.core.small import ASKS, FAILED
@@ -88,7 +87,9 @@ class Steps:
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
         state, trial, step = arc.state, arc.trial, arc.step
-        way = self.sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
+        at = trial.system.parameter_index(self.primary)
+        moved = abs(trial.x[at] - state.x[at]) > STANDS * (1 + abs(trial.x[at]))  # tangents are blurred at Hopf points
+        way = self.sense(trial) if turned or moved else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         sensed = free_values(trial) if way else state.sensed
         end, previous = trial.settled, state.tangent
@@ -128,8 +129,3 @@ class Steps:
             except ConvergenceError as error:
                 problem = error
         raise problem
-
-    def _has_moved(self, start: Array, trial: Trial) -> bool:
-        """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
-        at = trial.system.parameter_index(self.primary)
-        return bool(abs(trial.x[at] - start[at]) > STANDS * (1 + abs(trial.x[at])))

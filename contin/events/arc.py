@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -378,10 +378,3 @@ def stop_of(test: Event) -> Stop | None:
     if test.limit:
         return Stop(Reason.LIMIT, f"reached {test.name}")
     return Stop(Reason.EVENT, f"met {test.name}", event=test.name)
-
-
-def with_details(point: SpecialPoint, stop: Stop) -> SpecialPoint:
-    """Return a special point with the numbers that the reason of the end brings, unless it has details of another kind."""
-    if not stop.details or not isinstance(point.details, (dict, type(None))):
-        return point
-    return replace(point, details={**(point.details or {}), **stop.details})

@@ -15,7 +15,7 @@ from contin import errors as checks
 from contin.functions.batch import Batch
 from contin.functions.primitives import TABLE
 from contin.functions.recorded_arrays import NUMPY
-from contin.functions.tape import LIBRARIES, Number, Operation, Tape
+from contin.functions.tape import LIBRARIES, Number, Tape
 from contin.text import COLUMNS
 
 #: Operations that jump. Their derivatives are zero, so Newton's method does not see what they depend on.
@@ -81,8 +81,11 @@ def _from_tape(place: Place) -> str:
     for at in chosen:
         name, operands, data = tape.operations[at]
         numbers = [found[operand] for operand in operands]
-        if has_values and all(map(_finite, _partials(local, tape.operations[at], numbers, found[at], reads))):
-            continue
+        if has_values:
+            with np.errstate(all="ignore"):
+                partials = TABLE[name].partials(local, data, tuple(numbers), found[at])
+            if all(_finite(p) for operand, p in zip(operands, partials) if p is not None and reads[operand]):
+                continue
         if not has_values and _finite(found[at]):
             continue
         what = "has no finite derivative" if has_values else "is not finite"
@@ -104,13 +107,6 @@ def _chosen(tape: Tape, results: Sequence[int], found: dict[int, Number]) -> lis
             operands = (operands[1] if found[operands[0]].known else operands[2],)
         stack += [operand for operand in operands if operand not in reached]
     return sorted(reached)
-
-
-def _partials(local: Tape, operation: Operation, numbers: list[Number], result: Number, reads: list[bool]) -> list[Any]:
-    """Return the derivatives by operands that depend on inputs."""
-    with np.errstate(all="ignore"):
-        partials = TABLE[operation.name].partials(local, operation.data, tuple(numbers), result)
-    return [p for operand, p in zip(operation.operands, partials) if p is not None and reads[operand]]
 
 
 def _finite(number: Any) -> bool:

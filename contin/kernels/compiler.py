@@ -524,16 +524,11 @@ def _linked(library: JITCodeLibrary) -> Any:
     for other in dict.fromkeys(library._linking_libraries):
         library._final_module.link_in(other._get_module_for_linking(), preserve=True)
     for function in library._final_module.functions:
-        if _instructions(function) > _LONG:
+        if sum(1 for block in function.blocks for _ in block.instructions) > _LONG:
             function.add_function_attribute("noinline")  # it stands in the machine code once
     passes, builder = library._codegen._module_pass_manager()
     passes.run(library._final_module, builder)
     return library._final_module
-
-
-def _instructions(function: Any) -> int:
-    """Return the number of instructions of a function; 0 where it is only declared."""
-    return sum(1 for block in function.blocks for _ in block.instructions)
 
 
 #: Helpers of more instructions are called, not copied to where they are called: kernels run as fast, and are compiled in three

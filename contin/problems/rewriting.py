@@ -98,21 +98,14 @@ def of_parameters(
     if isinstance(value, str):
         if value not in parameters:
             raise ProblemError(f"{what}: {checks.shown(value)} is no parameter; there are {', '.join(parameters) or 'none'}")
-        return _named(value)
+        return lambda p: getattr(p, value)
     if callable(value):
         if argument_count(value) != 1:
             raise ProblemError(f"{what}: must be a function of p alone")
         return value
     checks.number(what, value, *([0] if positive else []))
-    return _constant(float(value))
-
-
-def _named(name: str) -> Function:
-    return lambda p: getattr(p, name)
-
-
-def _constant(value: float) -> Function:
-    return lambda p: value
+    number = float(value)
+    return lambda p: number
 
 
 def scaled(field: Function, by: str, parts: int = 1) -> Function:

@@ -12,6 +12,7 @@ from contin import errors as checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
+from contin.collocation.mesh import with_breaks
 from contin.core.system import System
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
@@ -283,7 +284,7 @@ def first_guess(
         mesh = _mesh_of(over_t(point, "guess: a Point must be a solution of a boundary value problem"), problem.order)
     system = problem.discretized(free, parameters, None, mesh, degree)
     if point is None:
-        system = system.on_breaks()
+        system = system.on_mesh(with_breaks(mesh, system.breaks))[0] if len(system.breaks) else system
         if problem.dimension < count:
             return system, with_guessed_multipliers(system, guess.states(system.nodes, problem.dimension))
     states = guess.states(system.nodes / problem.order, count)

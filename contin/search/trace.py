@@ -33,7 +33,7 @@ from contin.cycles.map_equations import MapSystem
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.equations import Algebraic, CriticalPair, critical_pair
 from contin.errors import ConvergenceError, ProblemError, Within, warn
-from contin.events.branch_point import BranchPoint, locate_branch_point
+from contin.events.branch_point import locate_branch_point
 from contin.events.labelled import finding_of, frequency_of
 from contin.levels import APART, BESIDE, ROUGH
 from contin.linalg.orientation import oriented_along
@@ -152,7 +152,10 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
     if not doubles(point):
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
     if not system.intervals:
-        return _doubled_map(system, point.x)
+        twice, x = system.doubled(point.x)  # the new branch leaves along a tangent that is none of that of single cycles
+        found = locate_branch_point(twice, x)
+        apart = [float(np.abs(np.subtract(*np.split(twice.states(tangent), 2))).max()) for tangent in found.tangents]
+        return twice, found.x, found.tangents[int(np.argmax(apart))]
     adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
@@ -160,28 +163,14 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
     problem, turn, gained = system.problem, system.problem.symmetry, system.gains[1]
     further = windings(problem.angles, problem.state_names, gained + turn @ gained)
     parameters = {**point.parameters, longer: factor * point.parameters[longer], **further}
-    twice: Any = problem.doubled().discretized(system.free, parameters, system.scales, mesh, system.degree)
+    twice = problem.doubled().discretized(system.free, parameters, system.scales, mesh, system.degree)
     states = system.states(x)
     x = twice.pack(np.concatenate([states, states[1:] @ turn.T + gained]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
-    return twice.with_reference(found.x), found.x, _alternating(twice, found, turn)
-
-
-def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
-    """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
-    twice, x = system.doubled(x)
-    found = locate_branch_point(twice, x)
-    return twice, found.x, max(found.tangents, key=lambda v: float(np.abs(np.subtract(*np.split(twice.states(v), 2))).max()))
-
-
-def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
-    """Return the unit tangent that changes most from one round to the next, turned by the symmetry.
-
-    The states of the other one may be round-off, as where the cycles do not depend on the parameter: no share of them tells.
-    """
-    half = twice.nodes.size // 2
+    half = twice.nodes.size // 2  # the tangent that changes most from one round to the next; all of the other may be round-off
     rounds = [(states[: half + 1] @ turn.T, states[half:]) for states in map(twice.states, found.tangents)]
-    return found.tangents[int(np.argmax([np.abs(first - second).max() for first, second in rounds]))]
+    tangent = found.tangents[int(np.argmax([np.abs(first - second).max() for first, second in rounds]))]
+    return twice.with_reference(found.x), found.x, tangent
 
 
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:
