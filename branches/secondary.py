@@ -126,7 +126,10 @@ def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
     try:
-        stored = _computed(place.folder / file, config, place.progress)
+        stored = complete_run(place.folder / file, config)
+        if stored is None:
+            write_bytes(place.folder / file, compute_scene(config, place.progress).image)
+            stored = read_branch(place.folder / file)
     except (ConfigError, ContinError) as error:
         return {"outcome": "failed", "reason": str(error)}
     diagram.add_branch(graph, stored, file)
@@ -157,15 +160,6 @@ def _arrived_before(graph, config: ClosedScene) -> str:
         if branch["domain"] == config.domain and any(diagram.same_place(end, origin) for end in ends):
             return branch["file"]
     return ""
-
-
-def _computed(path: Path, config: ClosedScene, progress: Progress) -> StoredBranch:
-    """Return the branch of a scene: from the file if it is complete, otherwise computed."""
-    stored = complete_run(path, config)
-    if stored is None:
-        write_bytes(path, compute_scene(config, progress).image)
-        stored = read_branch(path)
-    return stored
 
 
 def _goes(graph, file: str) -> str:

@@ -111,17 +111,13 @@ def _quadratures(kappa_n, omega, root_A, law, values, nodes):
     rate = convex * 2 * abs(root_A) * np.cos(theta) / (1 + tangent**2)  # of phi
     rate *= (w**2).sum(1) * (U11 * U33 - U13**2) / slope  # |M_2| dS/dtheta
     fall = 2 * (w[:, 1] * M1 - w[:, 0] * M3) * rate  # of M_2**2, by theta, up to the sign
-    M2 = np.sqrt(np.abs(_integral_to_the_end(fall, theta)))
+    k = np.arange(1, nodes)
+    coefficients = 2 / nodes * (np.sin(2 * np.outer(k, theta)) @ fall)  # a series of sin(2 k theta), given at midpoints
+    sines = np.sin(np.outer(math.pi / 2 - theta, k)) ** 2 / k  # its integral to pi/2, accurate near there as well
+    M2 = np.sqrt(np.abs(sines @ (coefficients * (-1.0) ** (k + 1))))
     precession = mu * w[:, 1] * M3 / (M2**2 + M3**2)
     integrands = np.array([np.ones_like(M2), precession, -d[6], d[0]])
     return integrands @ (rate / M2) * (math.pi / (2 * nodes))
-
-
-def _integral_to_the_end(values, theta):
-    """Return the integral from theta to pi/2 of a series of sin(2 k theta) given at midpoints, accurate near pi/2 as well."""
-    k = np.arange(1, len(theta))
-    coefficients = 2 / len(theta) * (np.sin(2 * np.outer(k, theta)) @ values)
-    return (np.sin(np.outer(math.pi / 2 - theta, k)) ** 2 / k) @ (coefficients * (-1.0) ** (k + 1))
 
 
 class _Branch:

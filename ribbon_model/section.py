@@ -348,7 +348,12 @@ def natural_end(section: Section) -> dict[str, float]:
         return {**dict.fromkeys(PLACE + ANGLES, 0.0), "distance": 1.0}
     state = natural_states(section, [1.0])[0]
     planar = abs(directors(*state[:4])[0] - 1) < LOOSE
-    angles = (0.0, _winding(section), 0.0) if planar else angles_of(state[:4])  # in the plane, the whole angle
+    if not planar:
+        angles = angles_of(state[:4])
+    else:  # the whole angle by which it turns about the width, the integral of kappa_n
+        datum, p = section.datum("kappa_n"), SimpleNamespace(**section.parameters)
+        s, weights = np.polynomial.legendre.leggauss(60)
+        angles = 0.0, float(sum(w / 2 * datum((x + 1) / 2, p) for x, w in zip(s, weights))), 0.0
     return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
 
 
@@ -361,10 +366,3 @@ def helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
     cosine = 2 * np.sin(half) ** 2 / (size or 1.0)  # (1 - cos)/size without cancellation
     place = axis * axis[2] * (t[:, None] - sine) + tangent * sine + np.cross(axis, tangent) * cosine
     return np.hstack([np.cos(half), np.sin(half) * axis, place])
-
-
-def _winding(section: Section) -> float:
-    """Return the whole angle by which the natural state turns about the width: the integral of kappa_n."""
-    datum, p = section.datum("kappa_n"), SimpleNamespace(**section.parameters)
-    s, weights = np.polynomial.legendre.leggauss(60)
-    return float(sum(w / 2 * datum((x + 1) / 2, p) for x, w in zip(s, weights)))

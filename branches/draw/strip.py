@@ -107,7 +107,11 @@ def rendered(shape, width: float, reach: float, pixels: int, view: View = OBLIQU
     for one, solid in solids_of(shape, width):
         samples.append(_flat_samples(solid, _FORCE if one.number else _SUPPORT if one.held else _JOINT, scale))
     points, normals, paint = (np.concatenate(column) for column in zip(*samples))
-    place, nearness = _places(points @ view.axes.T, reach, fine)
+    screen = points @ view.axes.T
+    pixel = ((screen[:, :2] * [1, -1] + reach) * (fine / (2 * reach))).astype(np.intp)
+    inside = (np.abs(screen[:, :2]) < reach).all(axis=1)
+    place = np.where(inside, pixel[:, 1] * fine + pixel[:, 0], -1)
+    nearness = screen[:, 2].astype(np.float32)
     seen = np.argsort(nearness)  # of several numbers put into one pixel, the last stays: the nearest to the eye
     seen = seen[place[seen] >= 0]
     nearest = np.full(fine * fine, -1)
@@ -149,13 +153,6 @@ def _flat_samples(mesh, paint: int, scale: float) -> tuple[np.ndarray, np.ndarra
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     points = np.einsum("abi,qij->qabj", weights, corners)
     return points.reshape(-1, 3), np.repeat(normals, a.size * b.size, axis=0), np.full(len(corners) * a.size * b.size, paint)
-
-
-def _places(screen, reach: float, fine: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixel, -1 outside the picture, and the nearness to the eye of points (N, 3) on the axes of a view."""
-    pixel = ((screen[:, :2] * [1, -1] + reach) * (fine / (2 * reach))).astype(np.intp)
-    inside = (np.abs(screen[:, :2]) < reach).all(axis=1)
-    return np.where(inside, pixel[:, 1] * fine + pixel[:, 0], -1), screen[:, 2].astype(np.float32)
 
 
 def _colours(normals, paint) -> np.ndarray:

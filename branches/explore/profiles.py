@@ -62,12 +62,15 @@ def _read(path: Path) -> list[tuple[str, str, StoredColumns]]:
 def _branch(name: str, file: str, stored: StoredColumns, axes: list[str]) -> dict:
     kept = dict.fromkeys([*axes, *(one for one in ("arclength", "index") if one in stored.columns)])
     count = min(max(len(times) for times, _ in stored.profiles), MOST_NODES)
-    values = np.array([_sampled(times, states, count) for times, states in stored.profiles])
+    values = []
+    for times, states in stored.profiles:  # at ``count`` of the nodes; of a map, at the first point of a cycle
+        at, table = np.linspace(0, len(times) - 1, count), np.column_stack([times, states[: len(times)]])
+        values.append(np.array([np.interp(at, np.arange(len(times)), column) for column in table.T]).T)
     return {
         "profile": True, "name": name, "file": file, "stop": stored.stop,
         **marked(stored.labels, stored.names),
         "columns": {one: column(stored.columns[one]) for one in kept}, "components": stored.states,
-        "shapes": compressed(values, each=True),
+        "shapes": compressed(np.array(values), each=True),
     }  # fmt: skip
 
 
@@ -79,9 +82,3 @@ def marked(labels: Sequence[str], names: Sequence[str]) -> dict:
         for number, label in there.items()
     ]
     return {"marks": marks, "labels": there}
-
-
-def _sampled(times: np.ndarray, states: np.ndarray, count: int) -> np.ndarray:
-    """Return times and states at ``count`` of the nodes, shape (count, 1 + states); of a map, at the first point of a cycle."""
-    at, table = np.linspace(0, len(times) - 1, count), np.column_stack([times, states[: len(times)]])
-    return np.array([np.interp(at, np.arange(len(times)), column) for column in table.T]).T

@@ -284,7 +284,10 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
     kept = [*dict.fromkeys([*varying, *shown])]
     for path, branch in branches:
         snaps = {fall.row: f"Let go past it, the strip {told(branch, fall)}." for fall in falls(branch)} if slow else {}
-        shapes, scale = _stage_shapes(branch), 2 * np.pi / branch.shape_length
+        at, scale = np.linspace(0, 1, _NODES), 2 * np.pi / branch.shape_length
+        found = {number: one for number, one in enumerate(solutions(branch)) if one is not None}
+        drawn = [branch.shape_at(number, at, system.evaluate(x, at))[0] for number, (system, x) in found.items()]
+        shapes = dict(zip(found, branch.stood(drawn)))
         reach = max(reach, scale * max(np.linalg.norm(shape.centreline, axis=1).max() for shape in shapes.values()))
         about = "" if len(branches) == 1 else f"{path.stem}, "
         stages += [one | {"name": about + one["name"]} for one in _stages(path, branch, kept, shapes, snaps)]
@@ -300,14 +303,6 @@ def stages_gathered(files: list[Path], title: str, slow: bool = True) -> dict:
         "eye": (_FAR * first.view.axes[2]).tolist(),
         "families": [{"name": "stages", "parameter": parameter, "branches": stages, "circles": []}],
     }  # fmt: skip
-
-
-def _stage_shapes(branch: StoredBranch) -> dict:
-    """Return the shapes of all points whose solution is found, with equidistant nodes, as pictures show them."""
-    at = np.linspace(0, 1, _NODES)
-    found = {number: one for number, one in enumerate(solutions(branch)) if one is not None}
-    shapes = [branch.shape_at(number, at, system.evaluate(x, at))[0] for number, (system, x) in found.items()]
-    return dict(zip(found, branch.stood(shapes)))
 
 
 def _stages(

@@ -94,10 +94,15 @@ def heights(curves, ends, window) -> list[np.ndarray]:
     """
     from threadpoolctl import threadpool_limits
 
-    columns = _columns(curves, window)
+    special = np.unique(np.concatenate([curve[_turns(curve)] for curve in curves]))  # where a branch begins, turns or ends
+    special = special[(special > window[0]) & (special < window[1])]
+    columns = np.concatenate([[window[0]], special[np.diff(special, prepend=window[0]) > _SAME], [window[1]]])
     courses = [_course(curve, columns, *end) for curve, end in zip(curves, ends)]
     circles = np.array(sorted({height for end in ends for height in end[:2] if height is not None}))
-    levels = _levels(circles)
+    step = np.diff(circles).min(initial=2.0) / (_LEVELS + 1)
+    between = [np.linspace(low, high, _LEVELS + 2)[1:-1] for low, high in zip(circles[:-1], circles[1:])]
+    beyond = step * np.arange(1, _LEVELS // 2 + 1)
+    levels = np.sort(np.concatenate([circles, *between, circles[0] - beyond, circles[-1] + beyond]))
     with threadpool_limits(1, "blas"):  # the matrices are small
         _search(courses, levels, np.isin(levels, circles))
     _straighten(courses, columns, circles)
@@ -113,13 +118,6 @@ def _turns(curve) -> np.ndarray:
     moves = np.flatnonzero(np.abs(step) > _SAME)
     turns = moves[1:][np.sign(step[moves[1:]]) != np.sign(step[moves[:-1]])]
     return np.unique(np.concatenate([[0], turns, [len(curve) - 1]]))
-
-
-def _columns(curves, window) -> np.ndarray:
-    """All abscissae where a branch begins, turns or ends, and the sides of the window; those that agree are one."""
-    special = np.unique(np.concatenate([curve[_turns(curve)] for curve in curves]))
-    special = special[(special > window[0]) & (special < window[1])]
-    return np.concatenate([[window[0]], special[np.diff(special, prepend=window[0]) > _SAME], [window[1]]])
 
 
 def _course(curve, columns, start, end, sense) -> Course:
@@ -140,14 +138,6 @@ def _course(curve, columns, start, end, sense) -> Course:
     if end is not None:
         sense = int(np.sign(end - start))
     return Course(column[new], at[new], (start, end), sense)
-
-
-def _levels(circles) -> np.ndarray:
-    """All heights that a branch may have above a column; those of the circles are for ends of branches alone."""
-    step = np.diff(circles).min(initial=2.0) / (_LEVELS + 1)
-    between = [np.linspace(low, high, _LEVELS + 2)[1:-1] for low, high in zip(circles[:-1], circles[1:])]
-    beyond = step * np.arange(1, _LEVELS // 2 + 1)
-    return np.sort(np.concatenate([circles, *between, circles[0] - beyond, circles[-1] + beyond]))
 
 
 # --- fewest crossings -------------------------------------------------------------------------------------------------

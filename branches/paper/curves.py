@@ -45,7 +45,8 @@ def curves(folder: Path) -> Section:
     rows, lines, worst = [], {}, 0.0
     for m, n in FOLDS:
         line, values, near = fold_curve(m, n)
-        worst = max(worst, _difference(m, n, line))
+        known = [(kappa_n, exact.folds(m, n, nu, kappa_limits=(-300, 300))) for nu, kappa_n in line[::3]]
+        worst = max(worst, *(min(abs(point.kappa_n - kappa_n) for point in folds) for kappa_n, folds in known))
         rows += [Row(f"fold of ({m}, {n}) at ν = {nu:g}: κₙL/2π =", "", f"{values[nu]:.8f}") for nu in sorted(values)]
         born = brentq(lambda nu, m=m, n=n: exact.initial_slope(m, n, nu), near - 0.02, near + 0.02, xtol=1e-14)
         remark = f"by quadrature: dκₙ/dA = 0 on the circle, at κₙL/2π = {exact.bifurcation(m, n, born):.6f}"
@@ -113,12 +114,6 @@ def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, 
     points = [*reversed(down.points), *up.points[1:]]
     found = [(Label.USER_ZERO if p.name == "start" else p.label, round(p["nu"], 13) + 0.0, p["kappa_n"]) for p in points]
     return np.array([(p["nu"], p["kappa_n"]) for p in points]), found
-
-
-def _difference(m, n, line) -> float:
-    """The largest difference from the quadrature, at every third point."""
-    known = [(kappa_n, exact.folds(m, n, nu, kappa_limits=(-300, 300))) for nu, kappa_n in line[::3]]
-    return max(min(abs(point.kappa_n - kappa_n) for point in folds) for kappa_n, folds in known)
 
 
 def _draw(lines, secondary, last, folder: Path) -> str:

@@ -225,7 +225,11 @@ def dimensions(strip: Strip, m: int, wanted: float, quiet: bool = True) -> str:
 
 
 def _line(strip: Strip, name: str, m: int, wanted: float) -> str:
-    places, values = _scan(strip, name, m)
+    middle = getattr(strip, name)
+    if not math.isfinite(middle):  # a straight strip: radii from that of the loop on
+        middle = strip.radius(1.0) * _RANGE
+    places = middle * np.geomspace(1 / _RANGE, _RANGE, _PLACES)
+    values = np.array([_changed(strip, name, float(place), m) for place in places])  # nan: not stable, or no such strip
     found = [
         brentq(lambda value: _changed(strip, name, value, m) - wanted, a, b, rtol=_PRECISION)
         for a, b, low, high in zip(places, places[1:], values, values[1:]) if (low - wanted) * (high - wanted) <= 0
@@ -239,15 +243,6 @@ def _line(strip: Strip, name: str, m: int, wanted: float) -> str:
     best = int(np.nanargmax(values))
     largest = f"{values[best]:.3g} J (at {1e3 * places[best]:.4g} mm)"
     return f"{none}; at the places tried the barrier lies between {np.nanmin(values):.3g} and {largest}"
-
-
-def _scan(strip: Strip, name: str, m: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return places of one dimension around its value, and the barriers there (nan: not stable, or no such strip)."""
-    middle = getattr(strip, name)
-    if not math.isfinite(middle):  # a straight strip: radii from that of the loop on
-        middle = strip.radius(1.0) * _RANGE
-    places = middle * np.geomspace(1 / _RANGE, _RANGE, _PLACES)
-    return places, np.array([_changed(strip, name, float(place), m) for place in places])
 
 
 def _changed(strip: Strip, name: str, value: float, m: int) -> float:

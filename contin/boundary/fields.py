@@ -223,8 +223,10 @@ class Fields(Spectral, Collocation):
         places = inside[:, rows, 0].ravel()
         into = csr_array((np.ones(places.size), (places, np.arange(places.size))), shape=(self.equations, places.size))
         matrix = _gathered(entries, (self.equations, self.equations))
-        shift = _BEYOND * _bound(field[:, rows, :n], rates)
-        return Pencil(matrix, into, _gathered([taken], (places.size, self.equations)), shift)
+        sizes = np.abs(rates).max(axis=2)
+        quotients = np.abs(field[:, rows, :n]).sum(axis=2)[sizes > 0] / sizes[sizes > 0]
+        fastest = float(quotients.max(initial=0.0)) or 1.0
+        return Pencil(matrix, into, _gathered([taken], (places.size, self.equations)), _BEYOND * fastest)
 
     def _by_nodes(self, values: Array, slopes: Array | None = None) -> Entries:
         """Return the entries by the states at the nodes of rows (N d, r, n) by those at Gauss points, and by their slopes."""
@@ -312,10 +314,3 @@ def _inverse(pencil: Pencil, kind: type) -> Function:
         return lambda v: rates @ factors.solve(np.asarray(into @ v, dtype=kind))
 
     return inverse
-
-
-def _bound(slopes: Array, rates: Array) -> float:
-    """Return the largest rate that the slopes (points, R, n) of the equations with rates allow; 1 where these are zero."""
-    sizes = np.abs(rates).max(axis=2)
-    quotients = np.abs(slopes).sum(axis=2)[sizes > 0] / sizes[sizes > 0]
-    return float(quotients.max(initial=0.0)) or 1.0

@@ -22,7 +22,7 @@ from one count (`contin.core.system`): the expansion is not made where three val
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -85,7 +85,8 @@ def scaled(
     unknown = [name for name, size in zip(names, sizes) if max(size, given.get(name, 0.0)) < USUAL[0]]
     if unknown or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
-        said = _said(primary, settings)
+        bounds = (*settings.limits.get(primary, ()), *settings.zeros.get(primary, ()))
+        said = min((abs(float(number)) for number in bounds if number), default=np.inf)
         if said >= USUAL[0] and any(first.usual(np.isin(names, unknown)) for _ in range(_VECTORS)):
             sizes = np.where(sizes < USUAL[0], 1.0, sizes)
         else:
@@ -528,12 +529,6 @@ def _larger(sizes: Array, others: Array, where: Pattern, error: Array) -> Array:
 def _counts(values: Array, natural: Array) -> Pattern:
     """Return which values are more than nothing, compared with the sizes that the expansion gives."""
     return (values >= USUAL[0]) | (values > DOUBLED * natural)
-
-
-def _said(name: str, settings: Settings) -> float:
-    """Return the smallest limit or value to be labelled of a parameter but zero; infinity where there is none."""
-    said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
-    return min((abs(float(number)) for number in said if number), default=np.inf)
 
 
 def renewed(system: Any, x: Array) -> tuple[Discretization, Carrier]:

@@ -110,16 +110,13 @@ class _Graph:
                 heapq.heappush(heap, (now, negative))
                 continue
             left.discard(place)
-            self._remove(place)
-
-    def _remove(self, place: int) -> None:
-        into, out = self.into.pop(place, {}), self.out.pop(place)
-        for end in out:
-            after = self.into[end].pop(place)
-            for start, before in into.items():
-                self._edge(start, end, self._product(before, after))
-        for start in into:
-            del self.out[start][place]
+            into, out = self.into.pop(place, {}), self.out.pop(place)
+            for end in out:
+                after = self.into[end].pop(place)
+                for start, before in into.items():
+                    self._edge(start, end, self._product(before, after))
+            for start in into:
+                del self.out[start][place]
 
     def entries(self) -> dict[tuple[int, int], int]:
         """Return what is left."""

@@ -75,13 +75,6 @@ def _of_fold(point: Record, wide: System, x: Array, by: Sequence[str]) -> dict[s
     return {name: {primary: float(-at[name] / at[primary])} for name in by}
 
 
-def _response(point: Record, column: Array) -> Array:
-    """Return the derivative of x by a parameter at a fixed place along the tangent, shape (size,), from that of F."""
-    system = system_of(point, "point")
-    _, factors = system.linearize(point.x, (system.weights * point.tangent,))
-    return factors.solve(np.append(-column, 0.0))
-
-
 def _with(point: Record, name: str) -> tuple[System, Array, Array, float]:
     """Return the system with one more free parameter, x for it, the derivative of F by it as it is in x, and its size there."""
     system = system_of(point, "point")
@@ -92,7 +85,8 @@ def _with(point: Record, name: str) -> tuple[System, Array, Array, float]:
 def _held(point: Record, name: str, held: str | Callable[[Trial], float]) -> dict[str, float]:
     """Return the response, moved along the branch until the held quantity is what it was."""
     system, (wide, x, column, size) = system_of(point, "point"), _with(point, name)
-    response = _response(point, column)
+    _, factors = system.linearize(point.x, (system.weights * point.tangent,))
+    response = factors.solve(np.append(-column, 0.0))  # at a fixed place along the tangent
     gradient = None if callable(held) else wide.column_gradient(x, held)
     if gradient is not None:
         across, along = (float(gradient @ np.append(v, end)) for v, end in ((response, 1.0), (point.tangent, 0.0)))

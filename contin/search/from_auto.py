@@ -339,18 +339,12 @@ def _system(
     if not degree:
         raise ProblemError("solution: is an equilibrium; state the problem as an AlgebraicProblem")
     system = problem.discretized(free, values, None, a + (b - a) * solution.t[::degree], degree)
-    x = system.pack(_at_nodes(solution), values)
-    return system.with_reference(x), x
-
-
-def _at_nodes(solution: AutoSolution) -> Array:
-    """Return the states at Lobatto nodes: AUTO's places divide each interval into equal parts."""
-    degree = solution.degree
-    places = np.linspace(0, 1, degree + 1)
+    places = np.linspace(0, 1, degree + 1)  # AUTO's divide each interval into equal parts; states are wanted at Lobatto nodes
     matrix = interpolation(places, 1 / (places[:, None] - places + np.eye(degree + 1)).prod(axis=1), basis(degree).nodes)
     starts = range(0, len(solution.t) - 1, degree)
     inner = [matrix[:-1] @ solution.states[start : start + degree + 1] for start in starts]
-    return np.concatenate([*inner, solution.states[-1:]])
+    x = system.pack(np.concatenate([*inner, solution.states[-1:]]), values)
+    return system.with_reference(x), x
 
 
 def _located(system: System, x: Array, solution: AutoSolution) -> Point:

@@ -35,7 +35,7 @@ from contin.levels import APART, LOCATED
 from contin.problems.statement import MOST_CONDITIONS, declared
 from contin.results.point import Point
 from contin.results.record import system_of
-from contin.search.guess import Guess, first_guess, parsed, with_guessed_multipliers
+from contin.search.guess import first_guess, parsed, with_guessed_multipliers
 from contin.search.solving import deflated, solved
 from contin.text import exact_text
 
@@ -274,7 +274,10 @@ class Site:
         """Yield kinds of guesses and guesses, those of solutions that are found meanwhile, too."""
         search, first = self._search, self.held((*self.known, *elsewhere)[0])[0]
         for guess in () if self._bases else search.guesses:
-            yield "given", *self._given(first, guess)
+            problem: Any = first.problem
+            values = dict(zip(problem.parameters, map(float, first.parameters)))
+            given = parsed(problem, guess, values)
+            yield "given", *first_guess(problem, given, values, first.free, max(first.intervals, 1), first.degree)
         fresh = [point for point in elsewhere if not any(point is other for other in self._elsewhere)]
         self._elsewhere += fresh
         for point in fresh:
@@ -296,13 +299,6 @@ class Site:
         held, x = system.with_free([name for name in system.free if name != self.primary], point.x)
         found: System = held.with_parameters({self.primary: self.value})
         return found, x
-
-    def _given(self, system: System, guess: Guess) -> tuple[System, Array]:
-        """Return a guess of the user, on a mesh like that of a known solution."""
-        values = dict(zip(system.problem.parameters, map(float, system.parameters)))
-        problem: Any = system.problem
-        given = parsed(problem, guess, values)
-        return first_guess(problem, given, values, system.free, max(system.intervals, 1), system.degree)
 
     def _beside(self, system: System, x: Array, account: Searched) -> Point | None:
         """Return a solution that is not known, from the deflated iteration or, where that finds none, damped steps from x."""

@@ -194,7 +194,11 @@ def leaving(start: Point, kind: str, branch: int) -> First:
         return _hopf_points(base, x, frequencies[-1] if frequencies else 0.0)
     if start.label == Label.GENERALIZED_HOPF:
         return _corrected_cycle(base, x, frequencies[0], None)
-    return _tori(base, x, frequencies, branch) if kind == Label.TORUS else (FoldCurve(base), x, None)
+    if kind != Label.TORUS:
+        return FoldCurve(base), x, None
+    if not 0 <= branch < len(frequencies):
+        raise ProblemError(f"branch: {branch} must lie between 0 and {len(frequencies) - 1}")
+    return _corrected_cycle(base, x, frequencies[branch], frequencies[1 - branch] if len(frequencies) > 1 else 0.0)
 
 
 def _frequencies(start: Point, base: Algebraic, x: Array) -> list[float]:
@@ -218,13 +222,6 @@ def _hopf_points(base: Algebraic, x: Array, frequency: float) -> First:
     row = np.zeros(curve.size)
     row[-1] = 1.0  # the square of the frequency grows
     return curve, x, linearization(curve, x, row).tangent
-
-
-def _tori(base: Algebraic, x: Array, frequencies: list[float], branch: int) -> First:
-    """Return the curve of torus bifurcations of the cycles of one pair."""
-    if not 0 <= branch < len(frequencies):
-        raise ProblemError(f"branch: {branch} must lie between 0 and {len(frequencies) - 1}")
-    return _corrected_cycle(base, x, frequencies[branch], frequencies[1 - branch] if len(frequencies) > 1 else 0.0)
 
 
 def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float | None) -> First:
