@@ -62,7 +62,12 @@ def main(argv=None) -> int:
     _check(options, is_diagram)
     figure, out, more = (_diagram if is_diagram else _branch)(options, path)
     check_picture(out)
-    with _style(options.style):
+    from matplotlib import style
+
+    name = options.style
+    if name is not None and name not in style.available and not Path(name).is_file():
+        raise ValueError(f"--style {name}: is no file, nor one of matplotlib's styles: {', '.join(style.available)}")
+    with style.context([] if name is None else name):
         write_picture(figure(), out)
     write_output(f"{more}written to {out}\n")
     return 0
@@ -88,15 +93,6 @@ def _inches(size: str | None) -> float | None:
     if not _SIZES[0] <= wide <= _SIZES[1]:
         raise ValueError(f"--size {size}: must be a number with mm, cm or in, from 1.5in to 50in, as in 90mm")
     return wide
-
-
-def _style(name: str | None):
-    """Return a context with a style of matplotlib."""
-    from matplotlib import style
-
-    if name is not None and name not in style.available and not Path(name).is_file():
-        raise ValueError(f"--style {name}: is no file, nor one of matplotlib's styles: {', '.join(style.available)}")
-    return style.context([] if name is None else name)
 
 
 def _check(options, is_diagram: bool) -> None:

@@ -34,7 +34,7 @@ from branches.store.read import read_branch, read_kind
 from contin import ConvergenceError, Newton
 from contin.lowlevel import Collocation, Label, correct, levels, point_of
 from ribbon_model import exact
-from ribbon_model.descent import METRICS, SEGMENTS, Descent, let_go, past
+from ribbon_model.descent import METRICS, SEGMENTS, let_go, past
 from ribbon_model.domains import DOMAINS
 from ribbon_model.equilibrium import strains_of
 from ribbon_model.laws import FINITE_WIDTH, LAWS, PAPER_LAWS
@@ -80,7 +80,7 @@ def _blas() -> ThreadpoolController:
 
 
 def _branch(path: Path, branch: StoredBranch, slow: bool) -> dict:
-    config, points = branch.config, branch.points
+    config, points, scene = branch.config, branch.points, branch.scene
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
     if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
@@ -93,7 +93,8 @@ def _branch(path: Path, branch: StoredBranch, slow: bool) -> dict:
         if "index_after" in event.dtype.names and event["index_after"] >= 0:
             mark["index_after"] = int(event["index_after"])
     about = {
-        "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]), "family": _family(branch.scene),
+        "axes": branch.columns.axes([*branch.columns.mapped("kappa_n"), "elastic"]),
+        "family": (list(LAWS).index(scene.law), -1.0 if scene.Gamma is None else scene.Gamma, scene.nu, scene.material),
         "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
         "title": config["title"], "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"),
         "domain": config["domain"], "stop": branch.stop, "file": path.name, "config": branch.scene_text(),
@@ -114,11 +115,6 @@ def _exact(scene: ClosedScene) -> dict:
         return {"none": str(error)}
     places = [{name: getattr(point, name) for name in _MAP} for point in points]
     return {"points": places, "folds": [place for place, point in zip(places, points) if point.label == Label.FOLD]}
-
-
-def _family(scene: ClosedScene) -> tuple:
-    """Return what the branches of one family share: the place of their law, its parameters, nu, and the law in words."""
-    return list(LAWS).index(scene.law), -1.0 if scene.Gamma is None else scene.Gamma, scene.nu, scene.material
 
 
 def family_of(branches: list[dict]) -> dict:
@@ -226,17 +222,12 @@ def way_down(branch: StoredBranch, event: np.void) -> dict | None:
         return {"kappa_n": kappa_n, "failed": str(error)}
     ends = {str(rest): rest for _, rest in ways}
     told = [{"name": name, "kind": one.kind, "m": one.m, "n": one.n, "energy": one.energy} for name, one in ends.items()]
-    return {"kappa_n": kappa_n, "ends": told} | _film(ways[0][0])
-
-
-def _film(descent: Descent) -> dict:
-    """Return columns and shapes of strips at equal distances along the way, each turned so that it moves least."""
-    strips = list(dict.fromkeys(descent.frames(_FRAMES)))
+    way = ways[0][0]  # strips at equal distances along it, each turned so that it moves least
+    strips = list(dict.fromkeys(way.frames(_FRAMES)))
     shapes = steady({number: strip.shape(MOST_NODES).placed(2 * math.pi) for number, strip in enumerate(strips)})
-    values = states_of(shapes.values())
-    columns = {"arclength": np.arange(len(strips)), "kappa_n": descent.end.kappa_n, "energy": [one.energy for one in strips]}
+    columns = {"arclength": np.arange(len(strips)), "kappa_n": way.end.kappa_n, "energy": [one.energy for one in strips]}
     packed = {name: column(np.broadcast_to(numbers, len(strips)).astype(float)) for name, numbers in columns.items()}
-    return {"columns": packed, "shapes": compressed(values)}
+    return {"kappa_n": kappa_n, "ends": told, "columns": packed, "shapes": compressed(states_of(shapes.values()))}
 
 
 def states_of(shapes: Iterable[Shape]) -> np.ndarray:

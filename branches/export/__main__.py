@@ -174,7 +174,11 @@ def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
             library(ending)
     point, length = labelled_point(branch, options.point), options.length or branch.length
     if ".csv" in endings.values():
-        table = _table(*branch.placed(point, length))
+        (shape, strains), columns = branch.placed(point, length), {}
+        for name, values in _fields(shape, strains).items():
+            columns |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": values[:, i] for i, axis in enumerate("xyz")}
+            columns |= dict(zip("xyz", shape.centreline.T)) if name == "s" else {}
+        table = _csv(columns)
     if any(ending in SURFACES for ending in endings.values()):
         shape, strains = branch.placed(point, length, _CELLS)
         mesh, fields = _mesh(branch, shape, length, options), _fields(shape, strains)
@@ -194,15 +198,6 @@ def _fields(shape: Shape, strains) -> dict[str, ndarray]:
     fields |= {"s": np.concatenate([part.arclength for part in parts])}
     fields |= {f"d{i + 1}": directors[:, i] for i in range(3)}
     return fields | {f"omega_{i + 1}": strains[:, i] for i in range(3)}
-
-
-def _table(shape: Shape, strains) -> bytes:
-    """Return arclength, centreline, directors and strains as comma-separated values with a line of names."""
-    columns: dict[str, ndarray] = {}
-    for name, values in _fields(shape, strains).items():
-        columns |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": values[:, i] for i, axis in enumerate("xyz")}
-        columns |= dict(zip("xyz", shape.centreline.T)) if name == "s" else {}
-    return _csv(columns)
 
 
 def _csv(columns: dict[str, ndarray]) -> bytes:

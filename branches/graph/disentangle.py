@@ -212,7 +212,10 @@ def _shortest(courses, mine: int, levels, circles) -> None:
         step = np.where(wrong, np.inf, 0.0)
         if course.seen[t]:
             here, beyond = course.column[t : t + 2]
-            step = step + climb + _crossed(levels, between.get(min(here, beyond), _NOBODY), here < beyond)
+            pairs = between.get(min(here, beyond), _NOBODY)
+            left, right = np.sign(levels[:, None, None] - pairs).transpose(2, 0, 1)
+            crossed = (left.shape[1] - left @ right.T) / 2  # by a step from a level (row) to another; half where it touches
+            step = step + climb + (crossed if here < beyond else crossed.T)
         total = np.round(cost[:, None] + step, 6)
         came.append(np.argmin(total, axis=0))
         cost = total.min(axis=0)
@@ -226,13 +229,6 @@ def _shortest(courses, mine: int, levels, circles) -> None:
     for back in reversed(came):
         way.append(int(back[way[-1]]))
     course.height = levels[way[::-1]]
-
-
-def _crossed(levels, pairs, rightwards) -> np.ndarray:
-    """How many of the others a step from one level (row) to another (column) crosses; half for one that it touches."""
-    left, right = np.sign(levels[:, None, None] - pairs).transpose(2, 0, 1)
-    crossed = (left.shape[1] - left @ right.T) / 2
-    return crossed if rightwards else crossed.T
 
 
 # --- straight lines ---------------------------------------------------------------------------------------------------

@@ -166,17 +166,12 @@ def _name(axes, found: list[Line], heights, coverings, taken) -> list[str]:
     named, obstacles = [], [(np.array(axes.get_xlim()), np.array([m, m])) for m in coverings]
     for line, height in zip(found, heights):
         seen = _within(line.kappa_n, axes.get_xlim()) & _within(height, axes.get_ylim())
-        for part in _runs(seen):
+        changes = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]]).astype(int)))
+        for part in map(slice, changes[::2], changes[1::2]):
             (named if line.name else obstacles).append((line.name, line.kappa_n[part], height[part])[0 if line.name else 1 :])
         marks = [line.place(mark) for mark in line.marks if mark.kind in MARKS]
         obstacles += [(line.kappa_n[[place]], height[[place]]) for place in marks if seen[place]]
     return name_lines(axes, named, obstacles, taken)
-
-
-def _runs(seen) -> list[slice]:
-    """Where a line is seen, one part after the other."""
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]]).astype(int)))
-    return [slice(first, last) for first, last in zip(changes[::2], changes[1::2])]
 
 
 def _within(values, ends):
@@ -411,7 +406,14 @@ def _line(graph, m: int, n: int, edges) -> Line:
     s, kappa_n, kappa_star = smooth(s, s, *columns)
     piece = np.searchsorted([data["arclength"][-1] for _, _, data in edges[:-1]], s)
     index = np.array([data.get("index", -1) for _, _, data in edges])[piece]
-    kappa_n, kappa_star, index = _refined(kappa_n, kappa_star, index)
+    # more points: steps in kappa_n are at most `_STEP`, so that heights can change between them
+    parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _PARTS).astype(int)
+    number = np.arange(len(kappa_n))
+    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    fine = np.append(np.repeat(number[:-1], parts) + within / np.repeat(parts, parts), number[-1])
+    fine = np.repeat(fine, 2) if len(fine) == 1 else fine  # a branch that ends where it begins
+    kappa_n, kappa_star = np.interp(fine, number, kappa_n), np.interp(fine, number, kappa_star)
+    index = index[np.ceil(fine).astype(int)]
     marks = []
     for node in (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b))):
         what = node["what"] if node["kind"] == "end" else ""
@@ -422,13 +424,3 @@ def _line(graph, m: int, n: int, edges) -> Line:
     if first is None or (last is not None and last < first):
         return Line(name, n, kappa_n[::-1], kappa_star[::-1], index[::-1], marks[::-1])
     return line
-
-
-def _refined(kappa_n, kappa_star, index) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same polyline with more points: steps in kappa_n are at most `_STEP`, so that heights can change between them."""
-    parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _PARTS).astype(int)
-    number = np.arange(len(kappa_n))
-    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-    fine = np.append(np.repeat(number[:-1], parts) + within / np.repeat(parts, parts), number[-1])
-    fine = np.repeat(fine, 2) if len(fine) == 1 else fine  # a branch that ends where it begins
-    return np.interp(fine, number, kappa_n), np.interp(fine, number, kappa_star), index[np.ceil(fine).astype(int)]

@@ -222,7 +222,10 @@ def _draw_curves(fold, birth, folder: Path) -> str:
             limit = thresholds(law, m, n, NU)[0]
             if limit < WINDOW[1]:
                 axes.plot(at, limit, marker, color=colour, clip_on=False, ms=6)
-    axes.plot(*_fine(fold).T, color="k", lw=2, label="fold of (1, 2)")
+    logs = np.column_stack([np.log(fold[:, 0]), fold[:, 1]])  # drawn as a spline over the length in (log Gamma, kappa_n)
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(logs, axis=0), axis=1)))
+    found = CubicSpline(length, logs)(np.linspace(0, length[-1], 400))
+    axes.plot(np.exp(found[:, 0]), found[:, 1], color="k", lw=2, label="fold of (1, 2)")
     axes.plot(*birth, "o", color="k", label=f"its birth, Γ = {birth[0]:.3f}")
     axes.plot([], [], color="0.4", label="threshold of (m, n)")
     axes.plot([], [], "<", color="0.4", label="flat rod")
@@ -233,14 +236,6 @@ def _draw_curves(fold, birth, folder: Path) -> str:
     axes.legend(frameon=False, ncols=2, fontsize=9)
     axes.grid(alpha=0.2)
     return keep(figure, folder, "finite_width_curves")
-
-
-def _fine(points: np.ndarray) -> np.ndarray:
-    """A smooth curve through the points of a curve, by a spline over the length along it in (log Gamma, kappa_n)."""
-    logs = np.column_stack([np.log(points[:, 0]), points[:, 1]])
-    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(logs, axis=0), axis=1)))
-    found = CubicSpline(length, logs)(np.linspace(0, length[-1], 400))
-    return np.column_stack([np.exp(found[:, 0]), found[:, 1]])
 
 
 def _draw_diagrams(graph, folder: Path) -> str:

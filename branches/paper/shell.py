@@ -38,7 +38,12 @@ def fig7(folder: Path) -> Section:
         ]
     rows += [_direct(outcome) for outcome in sorted(direct, key=_order)]
     rows += [_thermal(outcome) for outcome in sorted(thermal, key=_order)]
-    pictures = [_draw(outcomes, folder)]
+    figure = new_figure(12.5, 5.4)
+    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1))
+    _draw_laws(left)
+    _draw_roots(left, outcomes)
+    _draw_paper(right, direct)
+    pictures = [keep(figure, folder, "fig7")]
     return Section("Fig. 7: the unfolding semicircle by finite elements", rows, pictures, notes + _notes(outcomes))
 
 
@@ -133,15 +138,6 @@ def _means(outcomes: list[Outcome]) -> list[str]:
 
 
 # --- the picture ------------------------------------------------------------------------------------------------------
-
-
-def _draw(outcomes: list[Outcome], folder: Path) -> str:
-    figure = new_figure(12.5, 5.4)
-    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1))
-    _draw_laws(left)
-    _draw_roots(left, outcomes)
-    _draw_paper(right, [o for o in outcomes if o.case.way == "direct"])
-    return keep(figure, folder, "fig7")
 
 
 def _draw_laws(axes):

@@ -231,7 +231,12 @@ def seed(scene: ClosedScene):
     invalid.
     """
     if scene.origin:
-        return _leave_primary(scene)
+        from ribbon_model.solution import Solution  # 10 ms, which other branches do not need
+
+        try:
+            return secondary_branch(Solution.of(_at_origin(scene)), DOMAINS[scene.domain])
+        except (ContinError, ValueError) as error:
+            raise ConfigError(f"origin: {error}") from error
     coarse = ConfigError(
         f"mesh: {scene.mesh.intervals} intervals of degree {scene.mesh.degree} do not resolve the mode "
         f"(m, n) = ({scene.m}, {scene.n}) on the {scene.domain}; take more intervals"
@@ -251,16 +256,6 @@ def seed(scene: ClosedScene):
 
 
 # --- secondary branches ---------------------------------------------------------------------------------------------
-
-
-def _leave_primary(scene: ClosedScene):
-    """Return system, first point and tangent of a secondary branch; raise ConfigError where none leaves the primary one."""
-    from ribbon_model.solution import Solution  # 10 ms, which other branches do not need
-
-    try:
-        return secondary_branch(Solution.of(_at_origin(scene)), DOMAINS[scene.domain])
-    except (ContinError, ValueError) as error:
-        raise ConfigError(f"origin: {error}") from error
 
 
 def _at_origin(scene: ClosedScene):

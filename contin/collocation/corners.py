@@ -274,9 +274,16 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
     mesh = system.mesh
 
     def largest(times: Array, places: Array, which: Indices) -> Array:
-        """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
-        gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
-        return _of_selection(selections, gaps / units, which, np.abs(times - places[:, None]) / (mesh[-1] - mesh[0]))
+        """Return the largest gap of each switch at its times (K, parts), shape (K, parts).
+
+        Where it is not known, as at the knots of a table, it is that of a corner: the distance, as a part of the domain.
+        """
+        gaps = np.abs(selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p) / units)
+        found, number, parts = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0]), selections.of_gaps[:, 0], times.shape[1]
+        for k, selection in enumerate(which.tolist()):
+            if selections.known[selection]:
+                found[k] = gaps[k * parts : (k + 1) * parts, number == selection].max(axis=1, initial=0.0)
+        return found
 
     def worst(places: Array, ends: Array, which: Indices) -> Array:
         """Return the largest gap of each switch between its place and an end, shape (K,)."""
@@ -313,19 +320,6 @@ def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x
     known = np.concatenate([[mesh[0], mesh[-1]], system.breaks])
     kept &= (np.abs(places[:, None] - known) > edge).all(axis=1)
     return _merged(Switching(places[kept], costs[kept], jumps[kept], tuple(selections.names[k] for k in which[kept])), system)
-
-
-def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Array) -> Array:
-    """Return the largest gap of each switch at its own times, shape (K, parts); gaps (K parts, gaps) are those of all.
-
-    Where it is not known, as at the knots of a table, it is that of a corner: the distance ``away``, as a part of the domain.
-    """
-    sizes, number, parts = np.abs(gaps), selections.of_gaps[:, 0], away.shape[1]
-    found = away.copy()
-    for k, selection in enumerate(which.tolist()):
-        if selections.known[selection]:
-            found[k] = sizes[k * parts : (k + 1) * parts, number == selection].max(axis=1, initial=0.0)
-    return found
 
 
 def _merged(found: Switching, system: Any) -> Switching:

@@ -94,7 +94,10 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
     """Fill in the logarithms, or put right by Liouville's formula those that are ``known``; return what comes of it."""
     real, imaginary, n = room.real, room.imaginary, room.real.size
     if not known:
-        count = room.turn.shape[0] + _divide(room)
+        room.starts[0] = 0
+        for j in range(room.h.size):
+            room.starts[j + 1] = room.starts[j] + (1 if room.planar else _parts(room, j))
+        count = room.turn.shape[0] + room.starts[room.h.size]
         if count > room.matrices.shape[0]:
             return FULL
         _condense(room)
@@ -135,16 +138,6 @@ def nearest_to_one(room: Monodromy) -> tuple[int, float]:
         if size < least:
             place, least = a, size
     return place, least
-
-
-@helper
-def _divide(room: Monodromy) -> int:
-    """Fill in where the parts of each interval begin; return how many there are."""
-    room.starts[0] = 0
-    for j in range(room.h.size):
-        room.starts[j + 1] = room.starts[j] + (1 if room.planar else _parts(room, j))
-    count: int = room.starts[room.h.size]
-    return count
 
 
 @helper

@@ -215,7 +215,8 @@ class _FirstPoint:
                 natural = _larger(natural, sizes, natural == 0, error)
         found = np.where(_counts(known, natural) | (stated > 0), known, natural)
         small = (found > 0) & (found < USUAL[0]) & (stated == 0) & ~at
-        apart = self._apart(small)
+        alone = self._alone(small)  # infinite for states that enter linearly, which go as far as 1e12
+        apart = np.where(np.isfinite(alone), np.minimum(alone, 1.0), 0.0)
         found = np.where(small & ~_counts(found, apart), apart, found)
         guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
         nothing = found < CORRECTED * np.max(found[guessed], initial=0.0)
@@ -285,11 +286,6 @@ class _FirstPoint:
             if not np.any(part & left):
                 return
             left = left & ~part
-
-    def _apart(self, which: Pattern) -> Array:
-        """The same up to one, and 0 where that never happens: states that enter linearly go as far as 1e12."""
-        found = self._alone(which)
-        return np.where(np.isfinite(found), np.minimum(found, 1.0), 0.0)
 
     def _alone(self, which: Pattern) -> Array:
         """Return how far states can change by themselves before F_x is singular; infinity where that never happens."""

@@ -437,7 +437,8 @@ def _text(operation: Operation, operands: list[_Text]) -> _Text:
     name, data = operation.name, operation.data
     plain = [text for text, _ in operands]
     if name == "constant":
-        return _shortest(data), _NAME if data >= 0 else 1
+        texts = (f"{data:.15g}", f"{data:.16g}", f"{data:.17g}")  # as few digits as tell it from others
+        return next(text for text in texts if float(text) == data or text[-1] == "n"), _NAME if data >= 0 else 1
     if name in _SIGNS:
         sign, binds = _SIGNS[name]
         return f"{_within(operands[0], binds)} {sign} {_within(operands[1], binds + (name in ('sub', 'div')))}", binds
@@ -454,11 +455,6 @@ def _text(operation: Operation, operands: list[_Text]) -> _Text:
         search, index = data
         return f"{'argmin' if search.minimum else 'root'}{min(search.unknowns)}[{index}]", _NAME
     return f"{name}({', '.join(plain)})", _NAME
-
-
-def _shortest(value: float) -> str:
-    """Return a number with as few digits as tell it from others."""
-    return next(text for text in (f"{value:.15g}", f"{value:.16g}", f"{value:.17g}") if float(text) == value or text[-1] == "n")
 
 
 def _within(text: _Text, binds: int) -> str:

@@ -113,15 +113,11 @@ def _course(point: Record, names: Sequence[str]) -> tuple[Array, Array]:
     if declared(system.problem, "following"):
         following = system.following(point.x, t)
         states, rotating = np.hstack([states, following]), np.append(rotating, np.zeros(following.shape[1]))
-    return _on_circles(t * system.unit_time(point.x), states[:, which], rotating[which])
-
-
-def _on_circles(t: Array, states: Array, periods: Array) -> tuple[Array, Array]:
-    """Return times and states with those that have a period between minus and plus half of it; NaN where they jump back."""
-    states = states - whole_rounds(states, periods)
+    t, states, periods = t * system.unit_time(point.x), states[:, which], rotating[which]
+    states = states - whole_rounds(states, periods)  # angles between minus and plus half of their period ...
     jumps = np.abs(np.diff(states, axis=0)) > np.where(periods > 0, periods / 2, np.inf)
     after = np.flatnonzero(jumps.any(axis=1))
-    gaps = np.where(jumps[after], np.nan, states[after])
+    gaps = np.where(jumps[after], np.nan, states[after])  # ... with NaN where they jump back
     return np.insert(t, after + 1, t[after]), np.insert(states, after + 1, gaps, axis=0)
 
 

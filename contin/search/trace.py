@@ -73,18 +73,12 @@ def switched(
     system: Any = point.system
     if doubles(point) or system.is_smooth(point.x, frequency_of(point)):
         return found, x, way * along
-    return found, x, _one_sided(found, x, way * along)
-
-
-def _one_sided(cycles: Any, x: Array, along: Array) -> Array:
-    """Return the tangent with the rates of the free parameters by the size of a cycle, from a small cycle.
-
-    Terms like v |v| make them other than zero. Along the ellipse alone no step is believed, however short.
-    """
-    size = ROUGH / np.abs(along).max()
-    beside, row = cycles.with_reference(x + size * along), cycles.weights * along
-    rates = (correct(beside, x + size * along, row, row @ (x + size * along)).x - x) / size
-    return np.append(along[: cycles.state_size], rates[cycles.state_size :])
+    tangent = way * along  # terms like v |v| change the parameters; along the ellipse alone no step is believed, however short
+    size = ROUGH / np.abs(tangent).max()
+    beside: Any = found
+    beside, row = beside.with_reference(x + size * tangent), found.weights * tangent
+    rates = (correct(beside, x + size * tangent, row, row @ (x + size * tangent)).x - x) / size
+    return found, x, np.append(tangent[: found.state_size], rates[found.state_size :])
 
 
 def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Array]:

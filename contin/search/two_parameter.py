@@ -393,7 +393,10 @@ def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hol
     if event is not None:
         return _event(start, base, x, event)
     if hold is not None:
-        return _value(_holding(start, hold), base, x)
+        known = (*start.parameters, *start.functionals, *system.named_states)
+        if hold not in known:
+            raise ProblemError(f"hold: {checks.shown(hold)} is no column; there are {checks.listed(known)}")
+        return _value(dataclasses.replace(start, column=hold, value=start[hold]), base, x)
     found = (_on_curve if start.system.on_curve else _on_branch)(start, base, x)
     if found is None and _is_at_a_value(start):
         found = _value(start, base, x)
@@ -430,14 +433,6 @@ def _on_curve(start: Point, base: Any, x: Array) -> _First | None:
 def _is_at_a_value(start: Point) -> bool:
     """Return whether a column has the value that the point was located for."""
     return start.value is not None and abs(start[start.column] - start.value) <= APART * (1 + abs(start.value))
-
-
-def _holding(start: Point, column: str) -> Point:
-    """Return the point as one where a column has the value that it has; raise ProblemError if there is no such column."""
-    known = (*start.parameters, *start.functionals, *start.system.named_states)
-    if column not in known:
-        raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
-    return dataclasses.replace(start, column=column, value=start[column])
 
 
 def _value(start: Point, base: System, x: Array) -> _First:
