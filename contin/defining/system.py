@@ -234,6 +234,7 @@ class Defining(Discretization):
     states, evaluate, all_parameters, parameter, functionals, switching, check_jumps = map(
         _of_the_base, ("states", "evaluate", "all_parameters", "parameter", "functionals", "switching", "check_jumps")
     )
+    lasting = _of_the_base("lasting")
     discretization_error, newton_error, cut_off_errors = map(
         _with_factors, ("discretization_error", "newton_error", "cut_off_errors")
     )

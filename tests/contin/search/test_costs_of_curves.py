@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bank.gelfand import perturbed_gelfand
-from contin import AlgebraicProblem, curve, solve, trace
+from contin import AlgebraicProblem, CycleProblem, curve, cycle, solve, trace
 from contin.core.differences import of_function
+from contin.defining.special_points import FoldCurve
 
 
 @functools.cache
@@ -47,6 +48,15 @@ def test_both_ends_of_a_step_are_kept():
     for x in (point.x, other.x, point.x, other.x):
         system.once(computed, x)
     assert len(calls) == 2
+
+
+def test_first_cycle_is_far_by_what_no_shift_changes():
+    """The curve of folds compares the means and norms of cycles, too: without these each step shifts the first cycle."""
+    problem = CycleProblem(lambda u, p: (p.mu * u.x - u.y - u.x**3, u.x + p.nu * u.y), ["x", "y"], {"mu": 1.0, "nu": 0.0})
+    orbit = cycle(problem, [1.0, 0.0])
+    system, x = orbit.system.with_free(["mu", "period", "nu"], orbit.x)
+    lasting = FoldCurve(system).lasting(x)
+    assert lasting.size == 3 + 2 + 1 and np.array_equal(lasting, system.lasting(x))
 
 
 def test_linear_functions_do_not_bend():
