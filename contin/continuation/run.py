@@ -89,8 +89,8 @@ class Continuation:
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         check(system, settings)
         self.primary = settings.primary or system.free[0]
-        self._settings, path = settings, settings.on_path(system if state is None else state.system)
-        self._steps = Steps(path, self.primary, fold(self.primary) if settings.folds else None)
+        self._settings, self._path = settings, settings.on_path(system if state is None else state.system)
+        self._steps = Steps(self._path, self.primary, fold(self.primary) if settings.folds else None)
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._conditions = conditions(self.state.system)
         if self._conditions:
@@ -101,13 +101,13 @@ class Continuation:
         general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
         self._tests = [*general, *self._conditions, *self._own]
         self._meshes = MeshPolicy(self._steps, general)
-        self._notes = Notes(self.primary, path.mesh.tolerance, bool(settings.mesh.every))
+        self._notes = Notes(self.primary, self._path.mesh.tolerance, bool(settings.mesh.every))
         if conserved := getattr(system.solution.problem, "conserved", ""):
             self._notes.add(conserved)
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
-        self._watch = Watch(self.start, path, self._tests, general, self._steps.fold)
+        self._watch = Watch(self.start, self._path, self._tests, general, self._steps.fold)
         if state is None:
             self._notes.check_phases(self.here())
         self._handed: Handed | None = None  # the next step, where a kernel has made it
@@ -122,14 +122,14 @@ class Continuation:
 
     @settings.setter
     def settings(self, settings: Settings) -> None:
-        self._settings = settings
+        self._settings, self._path = settings, settings.on_path(self.state.system)
         self._follow()
 
     def _follow(self) -> None:
         """Make steps with the tolerance of the path, and exact ones where those cannot tell the primary's sense."""
         state, settings = self.state, self._settings
         if self._steps.fold is None or not STILL < abs(state.tangent[state.system.parameter_index(self.primary)]) < CLEAR:
-            settings = settings.on_path(state.system)
+            settings = self._path
         if settings != self._steps.settings:
             self._steps = dataclasses.replace(self._steps, settings=settings)
             self._meshes = dataclasses.replace(self._meshes, steps=self._steps)

@@ -36,6 +36,17 @@ def test_the_fold_of_bratus_problem(branch):
     assert branch.points[-1]["mean"] == pytest.approx(3, abs=1e-10)
 
 
+def test_settings_of_the_path_are_made_once(monkeypatch):
+    """Each takes a check of all fields, as long as a step of a small problem."""
+    made, on_path = [], Settings.on_path
+    monkeypatch.setattr(Settings, "on_path", lambda self, system: made.append(on_path(self, system)) or made[-1])
+    run = Continuation(*bratu_start(), Settings(limits={"lam": (-1, 4), "mean": (-1, 3)}, path_tolerance=1e-8))
+    points = list(run)
+    assert len(points) > 5 and len(made) == 1 and made[0].mesh.tolerance == 1e-8
+    run.settings = Settings(path_tolerance=1e-7)
+    assert made[1].mesh.tolerance == 1e-7
+
+
 def test_every_point_is_on_the_curve(branch):
     """Labelled ones too: lam from the closed form with the same mean of u."""
     assert len(branch) > 20
