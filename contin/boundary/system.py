@@ -419,7 +419,7 @@ class Collocation(Composed):
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several directions; two of them move the crossings."""
         found: Array = super().along(x, directions)
-        for each, by_shift in self._of_shifts(x) if len(directions) == 2 else ():
+        for each, by_shift in self._of_shifts(x) if self.outcomes.size and len(directions) == 2 else ():
             a, b = (v[self._beside(each)] for v in directions)
             found += by_shift @ each.shift_bent(a) @ b
         return found
@@ -427,7 +427,7 @@ class Collocation(Composed):
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v) by x."""
         found: Array = super().bent(x, w, v)
-        for each, by_shift in self._of_shifts(x):
+        for each, by_shift in self._of_shifts(x) if self.outcomes.size else ():
             at = self._beside(each)
             found[at] += w @ by_shift @ each.shift_bent(v[at])
         return found
@@ -436,7 +436,7 @@ class Collocation(Composed):
         """Yield the crossings, and the derivatives of F by the states with which the intervals behind them begin."""
         inside, both = self._terms[0], [self.basis.value[:, 0], self.basis.slope[:, 0]]
         units = np.eye(self._n, self._n + self.problem.integral_size)
-        slopes = inside.slopes(x, inside.columns)[:, :, : self._n].transpose(2, 0, 1) if self.outcomes.size else ()
+        slopes = inside.slopes(x, inside.columns)[:, :, : self._n].transpose(2, 0, 1)
         for each in self.crossings(x):
             value, slope = np.kron(np.arange(self.intervals) == each.node, both)[:, :, None]
             yield each, np.transpose([inside.rows(f * value - e * slope / self._h_points) for f, e in zip(slopes, units)])
