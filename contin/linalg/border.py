@@ -107,10 +107,11 @@ class Bordered:
         return self.transposed[:, : self._shape[0]]
 
 
+@functools.lru_cache(maxsize=8)
 def _units(size: int, count: int) -> Array:
-    """Return the last unit vectors as rows."""
-    units = np.zeros((count, size))
-    units[:, size - count :] = np.eye(count)
+    """Return the last unit vectors as rows: not to be written to."""
+    units = np.eye(count, size, size - count)
+    units.flags.writeable = False
     return units
 
 
