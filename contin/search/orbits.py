@@ -33,8 +33,12 @@ from contin.cycles.equations import CycleCollocation
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.equations import Algebraic
 from contin.errors import ConvergenceError, Positive, ProblemError
+from contin.functions.batch import Batch
+from contin.functions.interpreter import Loaded, Points, evaluate
 from contin.functions.signature import named_values
-from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import Matrix, Stack, Vector
+from contin.levels import DOUBLED, LOCATED, MOST_HALVINGS, ROUGH, TINY
 from contin.linalg.orientation import first_least, oriented
 from contin.problems.angles import periods_of, whole_rounds, winding_names, windings
 from contin.problems.statement import PERIOD, ROUNDS, TIME, declared
@@ -55,12 +59,20 @@ _CLOSED = 1e-2
 _PARTS = (1 / 64, 1 / 16, 1 / 4, 1)
 #: Looks at a motion in each round of an angle: at three or less, a whole round could look like none.
 _PER_ROUND = 8
-#: Places of the round that is the guess.
+#: Places of the round that is the guess, and of a step in which it ends.
 _SAMPLES = 1000
 #: Largest number of periods of the forcing after which a motion is looked for to close: four period doublings.
 _MOST_ROUNDS = 16
-#: Most steps of the integration: orbits take a few hundred.
-_STEPS = 10_000
+#: Most steps of the integration: orbits take a few hundred, a motion that settles ten thousand. Ten times larger, a stiff field
+#: takes 1 s before an implicit method is tried.
+_STEPS = 30_000
+#: Weights of the stages of a step by Dormand and Prince (1980), and of the difference to the method of order 4.
+_TABLE = np.zeros((8, 7))
+_TABLE[np.tril_indices(7, -1)] = np.concatenate([
+    [1 / 5, 3 / 40, 9 / 40, 44 / 45, -56 / 15, 32 / 9, 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 9017 / 3168],
+    [-355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+])  # fmt: skip
+_TABLE[7] = -71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40
 #: Longest time, in units of 1 / the eigenvalue: an orbit that takes longer has gone elsewhere. It takes 16 to leave.
 _LONGEST = 500.0
 #: The orbit has turned back where it is closest for the first time, if it is closer than this part of its largest distance.
@@ -138,10 +150,11 @@ class _Saddle:
         left = np.linalg.inv(vectors)[at].real
         return rest, right, left / (left @ right), float(found[at].real)
 
-    def field(self, value: float) -> Any:
-        """Return the rates of the states as an integrator calls them."""
+    def field(self, value: float) -> Field:
+        """Return the field at a value of the parameter."""
         system = self._algebraic({**self.values, self.name: value})
-        return lambda t, u: self.sense * system.residual(u)
+        batch, sense = self.problem.batch("residual"), self.sense
+        return Field(lambda t, u: sense * system.residual(u), batch, system.parameters, sense)
 
 
 def grown_orbit(start: Point, name: str, interval: tuple[float, float], direction: int) -> tuple[GrownOrbit, int]:
@@ -221,32 +234,22 @@ def _followed(saddle: _Saddle, value: float, guess: Array, direction: int) -> Gr
 
 def _until_return(saddle: _Saddle, value: float, rest: Array, start: Array, longest: float) -> tuple[Array, Array] | None:
     """Return times (K,) and states (K, n) of an orbit up to where it is closest to the saddle again; None without a return."""
-    from scipy.integrate import LSODA  # type: ignore[import-untyped]  # .3 s; only this needs it
-    from scipy.optimize import brentq  # type: ignore[import-untyped]
-
     field = saddle.field(value)
-
-    def approach(t: float, u: Array) -> float:
-        return float(saddle.apart(u, rest) @ field(t, u))
-
-    def distance(u: Array) -> float:
-        return float(np.linalg.norm(saddle.apart(u, rest)))
-
-    solver = LSODA(field, 0.0, start, longest, rtol=LOCATED, atol=LOCATED)
-    times, states, farthest, last = [0.0], [start], 0.0, 1.0
-    while solver.status == "running" and len(times) < _STEPS:
-        solver.step()
-        u, before = solver.y.copy(), last
-        if solver.status == "failed" or not np.abs(u - rest).max() < _FAR * (1 + np.abs(rest).max()):
+    for part in _PARTS:
+        try:
+            done = _integrated(field, start, part * longest, LOCATED)
+        except ProblemError:  # it goes to infinity
             return None
-        last, between = approach(solver.t, u), solver.dense_output()
-        farthest = max(farthest, distance(u))
-        if before < 0 <= last and approach(times[-1], between(times[-1])) < 0 < approach(solver.t, between(solver.t)):
-            t = float(brentq(lambda t, between=between: approach(t, between(t)), times[-1], solver.t))
-            if distance(between(t)) < _BACK * farthest:
-                return np.array([*times, t]), np.array([*states, between(t)])
-        times.append(float(solver.t))
-        states.append(u)
+
+        def approach(t: Array, sol: Callable[[Array], Array] = done.sol) -> Array:
+            u = sol(t).T
+            return np.sum(saddle.apart(u, rest) * field.batch.values(t, u, u[:0], field.p), axis=1) * saddle.sense
+
+        far = np.linalg.norm(saddle.apart(done.y.T, rest), axis=1)
+        for t in _passages(done.t, approach):
+            there, before = done.sol(t), done.t < t
+            if np.linalg.norm(saddle.apart(there, rest)) < _BACK * far[before].max():
+                return np.append(done.t[before], t), np.concatenate([done.y.T[before], there[None]])
     return None
 
 
@@ -428,7 +431,7 @@ def cycle(
     found = restated(problem, first, dict(parameters or {}))
     problem, first, values = found[0], found[1].at(found[1].places)[0], found[2]
     values = {**problem.parameters, **values}
-    field = _vector_field(problem, values)
+    field = _field(problem, values)
     if problem.period is None:
         settled = _settled(field, first, settle)
         times, states = _one_round(field, settled, settle, periods_of(problem))
@@ -440,17 +443,23 @@ def cycle(
     return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
 
 
-#: The field as an integrator calls it, f(t, u).
-Field = Callable[[float, Array], Any]
+class Field(NamedTuple):
+    """The field of a motion as SciPy's integrators call it, and functions of time in a unit, negative if it runs backwards."""
+
+    rates: Callable[[float, Array], Any]
+    batch: Batch
+    p: Array
+    unit: float
 
 
-def _vector_field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
-    """Return the field as an integrator of SciPy calls it."""
-    of_state = named_values(problem.state_names)
-    p, field = named_values(tuple(values))(**values), problem.field
+def _field(problem: CycleProblem, values: Mapping[str, float]) -> Field:
+    """Return the field of a problem."""
+    of_state, p, field = named_values(problem.state_names), named_values(tuple(values))(**values), problem.field
+    own = {**values, PERIOD: float(problem.order), ROUNDS: 1.0}
+    given = problem.batch("field"), np.array([own[name] for name in problem.parameters])
     if problem.period is None:
-        return lambda t, u: field(of_state(*u), p)
-    return lambda t, u: field(t, of_state(*u), p)
+        return Field(lambda t, u: field(of_state(*u), p), *given, 1.0)
+    return Field(lambda t, u: field(t, of_state(*u), p), *given, problem.duration(own))
 
 
 class _Motion(NamedTuple):
@@ -461,22 +470,90 @@ class _Motion(NamedTuple):
     sol: Any
 
 
+@kernel(reorder=False, last=True)
+def follow(
+    loaded: Loaded, units: float, tolerance: float, table: Matrix, stages: Stack, at: Points, times: Vector, found: Stack
+) -> int:
+    """Integrate over the unit interval, that is so many units of time, from the first of the states; return how many steps.
+
+    0 where there is no room. ``found`` (2, K, n) are states and rates. Dormand and Prince's method of order 5, with the error
+    of a step from that of order 4.
+    """
+    instructions, begin, end, room, _ = loaded
+    states, rates, row, first, step, error = found[0], found[1], 0, 0, 1.0 / times.size, stages.shape[0]
+    for _ in range(times.size - 1):
+        step = min(step, 1.0 - times[row])
+        for i in range(first, error):  # the last stage is the first one of the next step
+            at.t[0] = units * times[row]
+            for a in range(states.shape[1]):
+                at.u[0, a] = states[row, a]
+            for j in range(i):
+                at.t[0] += units * step * table[i, j]
+                for a in range(states.shape[1]):
+                    at.u[0, a] += units * step * table[i, j] * stages[j, 0, a]
+            evaluate(instructions, begin, end, at, room, stages[i], stages[:0])
+        first, factor = 1, 5.0
+        for a in range(states.shape[1]):
+            gap, rates[row, a] = 0.0, units * stages[0, 0, a]
+            for j in range(error):
+                gap += units * step * table[error, j] * stages[j, 0, a]
+            longer = 0.9 * (tolerance * (1.0 + max(abs(states[row, a]), abs(at.u[0, a]))) / (abs(gap) + TINY)) ** 0.2
+            factor = min(factor, longer) if longer > 0.2 else 0.2  # where it is none, too
+        if factor >= 0.9:
+            row += 1
+            times[row] = times[row - 1] + step
+            for a in range(states.shape[1]):
+                states[row, a], stages[0, 0, a] = at.u[0, a], stages[error - 1, 0, a]
+                rates[row, a] = units * stages[0, 0, a]
+            if not times[row] < 1.0:
+                return row
+        step *= factor
+    return 0
+
+
+def _explicit(field: Field, start: Array, time: float, tolerance: float) -> _Motion | None:
+    """Return a motion of recorded functions; None where it goes far, or takes many steps: an implicit method may take few."""
+    if field.batch.recorded is None:
+        return None
+    n, loaded, times, track = start.size, field.batch.load(), np.zeros(_STEPS), np.empty((2, _STEPS, start.size))
+    loaded.instructions.scalars[loaded.parameters : loaded.parameters + field.p.size] = field.p
+    at, track[0, 0] = Points(np.empty(1), np.empty((1, n)), np.empty((0, n))), start
+    last = follow(loaded, time / field.unit, tolerance, _TABLE, np.empty((7, 1, n)), at, times, track)
+    times, states, rates = time * times[: last + 1], track[0, : last + 1], track[1, : last + 1] / time
+
+    def between(t: Any) -> Array:
+        """Return the cubics through states and rates at both ends of steps."""
+        i = np.clip(np.searchsorted(times, t, side="right") - 1, 0, last - 1)
+        h, change = (times[i + 1] - times[i])[..., None], states[i + 1] - states[i]
+        s, first, second = (t - times[i])[..., None] / h, h * rates[i], h * rates[i + 1]
+        return (states[i] + s * (first + s * (3 * change - 2 * first - second + s * (first + second - 2 * change)))).T
+
+    near = last and np.abs(states).max() < _FAR * (1 + np.abs(start).max())
+    return _Motion(times, states.T, between) if near else None
+
+
 def _settled(field: Field, start: Array, time: float) -> Array:
     """Return the states (n,) after a time. The integrator's loop in C takes a third of the time of one in Python."""
-    from scipy.integrate import odeint
+    found = _explicit(field, start, time, _SETTLES)
+    if found is not None:
+        return found.y[:, -1]
+    from scipy.integrate import odeint  # type: ignore[import-untyped]
 
     with warnings.catch_warnings(action="ignore"):  # where it fails, the loop below tells when
-        y = odeint(field, start, (0.0, time), rtol=_SETTLES, atol=_SETTLES, mxstep=2**31 - 1, tfirst=True)[-1]
+        y = odeint(field.rates, start, (0.0, time), rtol=_SETTLES, atol=_SETTLES, mxstep=2**31 - 1, tfirst=True)[-1]
     return y if np.abs(y).max(initial=0.0) < _FAR else _integrated(field, start, time, _SETTLES).y[:, -1]
 
 
 def _integrated(field: Field, start: Array, time: float, tolerance: float) -> _Motion:
     """Return the motion from a start. SciPy's own loop around its integrator takes longer than the steps."""
+    found = _explicit(field, start, time, tolerance)
+    if found is not None:
+        return found
     from scipy.integrate import LSODA, OdeSolution  # .3 s; only this needs it
 
-    far, steps = _FAR * (1 + np.abs(start).max(initial=0.0)), LSODA(field, 0.0, start, time, rtol=tolerance, atol=tolerance)
+    steps = LSODA(field.rates, 0.0, start, time, rtol=tolerance, atol=tolerance)
     times, states, pieces = [0.0], [np.array(start)], []
-    while steps.status == "running" and np.abs(states[-1]).max(initial=0.0) < far:
+    while steps.status == "running" and np.abs(states[-1]).max(initial=0.0) < _FAR * (1 + np.abs(start).max(initial=0.0)):
         steps.step()
         times.append(float(steps.t))
         states.append(steps.y.copy())
@@ -488,12 +565,11 @@ def _integrated(field: Field, start: Array, time: float, tolerance: float) -> _M
 
 def _passages(times: Array, height: Callable[[Array], Array]) -> Iterator[float]:
     """Yield the times between given ones at which a height passes zero upwards. SciPy's events fail at ends of its steps."""
-    from scipy.optimize import brentq  # the integrator has loaded it
-
     values = height(times)
     values[0] = 0.0  # where it begins, to the last digit
     for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
-        yield float(brentq(height, times[i], times[i + 1]))
+        between = np.linspace(times[i], times[i + 1], _SAMPLES)
+        yield float(between[np.argmax(height(between) >= 0)])
 
 
 def _looks(times: Array, states: Array, periods: Array) -> Array:
@@ -544,7 +620,7 @@ def _one_round(field: Field, start: Array, longest: float, periods: Array) -> tu
     A round ends where the motion comes back through the plane normal to it at its start, close to the start; angles come back
     up to whole rounds.
     """
-    across = np.asarray(field(0.0, start), dtype=float)
+    across = np.asarray(field.rates(0.0, start), dtype=float)
     for part in _PARTS:
         done = _integrated(field, start, part * longest, LOCATED)
         size = _size(done.y, periods)

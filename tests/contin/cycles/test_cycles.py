@@ -10,6 +10,7 @@ from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
 from contin.continuation import plain_on_mesh
 from contin.cycles import equations as cycles
 from contin.events import hopf
+from contin.search import orbits
 
 
 def circle(u, p):
@@ -105,6 +106,22 @@ def test_van_der_pol_to_a_multiplier_that_no_number_holds():
     trivial, small = found.logarithms
     assert abs(trivial) < 1e-9 and small.real < -240 and found.errors[0] == abs(trivial) and found.errors[1] < 1e-6
     assert found.unstable == 0
+
+
+@pytest.mark.parametrize(("mu", "period"), [(1.0, 6.6632868593), (1000.0, 1614.29)])
+def test_motions_settle_by_an_explicit_method_and_by_others(mu, period):
+    """SciPy integrates functions that are not recorded, and stiff ones. The period for 1000 is that of Dorodnitsyn."""
+
+    def unrecorded(u, p):
+        return van_der_pol(u, type(p)(float(str(float(p.mu)))))
+
+    for field in (van_der_pol, unrecorded):
+        problem = CycleProblem(field, ["x", "v"], {"mu": mu})
+        given = orbits._field(problem, problem.parameters)
+        done = orbits._integrated(given, np.array([2.0, 0.0]), 3 * period, 1e-9)
+        assert (orbits._explicit(given, done.y[:, 0], 3 * period, 1e-9) is None) == (mu > 1 or field is unrecorded)
+        first, second, *_ = orbits._passages(done.t, lambda t, sol=done.sol: sol(t)[0] - 1.5)
+        assert second - first == pytest.approx(period, rel=1e-4)
 
 
 def test_from_a_hopf_point():
