@@ -42,8 +42,8 @@ def take_autos_tolerances() -> None:
 
 
 def take_path_tolerance() -> None:
-    """Let this process run all demos with points between labelled ones, which are not compared, that are less exact."""
-    Settings.__init__ = _made_with(Settings.__init__, "path_tolerance", 1e-8)
+    """Let this process run all demos with points between labelled ones, which are not compared, about as exact as AUTO's."""
+    Settings.__init__ = _made_with(Settings.__init__, "path_tolerance", 1e-6)
 
 
 def _made_with(init: Callable[..., None], name: str, value: object) -> Callable[..., None]:
