@@ -149,8 +149,11 @@ def _on_made_mesh(point: SpecialPoint, trial: Trial, details: object, settings: 
 
 
 def _part_left(coarse: Trial, better: Trial) -> float:
-    """Return the part of a move to a better mesh that may be left there: _SAFE times what the order and both errors say."""
-    order = (coarse.system.intervals / better.system.intervals) ** (2 * coarse.system.degree)
+    """Return the part of a move to a better mesh that may be left there: _SAFE times what the order and both errors say.
+
+    The order is half that of fine meshes, which multipliers of steep waves reach later than solutions do.
+    """
+    order = (coarse.system.intervals / better.system.intervals) ** coarse.system.degree
     return min(_SAFE * max(order, better.discretization_error / coarse.discretization_error), 1.0)
 
 

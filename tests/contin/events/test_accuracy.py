@@ -67,6 +67,27 @@ def test_errors_of_labelled_points_on_a_path_that_is_less_exact(path):
         assert abs(point["lam"] - load) <= point.errors["lam"] + 1e-14 < 2e-12
 
 
+def wave(u, p):
+    """Reaction waves in a membrane, u(x - c t): AUTO's demo ``wav``."""
+    rate = u.y / (3.4 + u.y) * u.x / (1 + u.x + 0.023 * u.x**2)
+    f1, f2 = -3 * (210 * rate - (145 - u.x)), -3 * (210 * rate - 0.2 * (p.s - u.y))
+    return u.v, u.w, -(0.05 * u.v + f1), -(0.05 * u.w + f2) / 5
+
+
+def test_errors_of_multipliers_of_steep_waves():
+    """A doubling where s stands still within 1e-4, on half the intervals, lies within its ± of that on a fine path.
+
+    Taken from the order h^(2 d), which these multipliers have not reached there, its ± was 45 times too small.
+    """
+    problem = contin.AlgebraicProblem(wave, ["x", "y", "v", "w"], {"s": 640.0})
+    rest = contin.trace(contin.solve(problem, [62.8, 88.8, 0.0, 0.0]), free=["s"], limits={"s": (500, 800)}, direction="both")
+    start, limits = rest.labelled("HB")[0], {"s": (600, 700), "period": (0, 36)}
+    last = [contin.trace(start, branch=1, limits=limits, path_tolerance=path).labelled("PD")[-1] for path in (1e-6, None)]
+    assert 35 < last[0]["period"] < 36 and 2 * last[0].system.intervals < last[1].system.intervals
+    for name in ("s", "period"):
+        assert abs(last[0][name] - last[1][name]) < last[0].errors[name] + last[1].errors[name]
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("degree", "intervals"), [(2, 100), (3, 60), (4, 40), (4, 100), (5, 40), (7, 30)])
 def test_the_estimate_on_a_mesh_that_is_kept(degree, intervals):
