@@ -101,7 +101,8 @@ def listed(names: Iterable[str]) -> str:
 def shown(value: object) -> str:
     """Return the value in one short line."""
     try:
-        text = " ".join(repr(value).split())
+        with np.printoptions(threshold=_SHOWN, edgeitems=_SHOWN // 4):  # all of a large array takes 10 ms
+            text = " ".join(repr(value).split())
     except Exception:  # an integer of too many digits, or an object whose repr is broken
         text = f"a value of type {type(value).__name__}"
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
