@@ -50,13 +50,29 @@ def test_both_ends_of_a_step_are_kept():
     assert len(calls) == 2
 
 
+@functools.cache
+def turning():
+    """The cycle of van der Pol's equation."""
+    problem = CycleProblem(lambda u, p: (p.mu * u.x - u.y - u.x**3, u.x + p.nu * u.y), ["x", "y"], {"mu": 1.0, "nu": 0.0})
+    return cycle(problem, [1.0, 0.0])
+
+
 def test_first_cycle_is_far_by_what_no_shift_changes():
     """The curve of folds compares the means and norms of cycles, too: without these each step shifts the first cycle."""
-    problem = CycleProblem(lambda u, p: (p.mu * u.x - u.y - u.x**3, u.x + p.nu * u.y), ["x", "y"], {"mu": 1.0, "nu": 0.0})
-    orbit = cycle(problem, [1.0, 0.0])
+    orbit = turning()
     system, x = orbit.system.with_free(["mu", "period", "nu"], orbit.x)
     lasting = FoldCurve(system).lasting(x)
     assert lasting.size == 3 + 2 + 1 and np.array_equal(lasting, system.lasting(x))
+
+
+def test_borders_stay_with_another_reference():
+    """They are about the null vectors of the same cycle: random ones would take a second matrix."""
+    orbit = turning()
+    system, x = orbit.system.with_free(["mu", "period", "nu"], orbit.x)
+    folds = FoldCurve(system)
+    folds.own_values(x)
+    other = folds.referring_to(x, np.zeros(x.size))
+    assert other is not folds and other.borders is folds.borders
 
 
 def test_linear_functions_do_not_bend():
