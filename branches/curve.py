@@ -71,7 +71,13 @@ def main(argv=None) -> int:
         if out.name.endswith(".csv"):
             write_bytes(out, table.encode()) if options.out else write_output(table)
         else:
-            write_picture(_figure(branch, names, smooth(s, s, *values)[1:]), out)
+            from matplotlib.figure import Figure
+
+            axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
+            axes.plot(*smooth(s, s, *values)[1:], color="black")
+            across, up = (branch.axis(name)[1] for name in names)
+            axes.set(xlabel=across, ylabel=up, title=f"folds of {branch.caption.partition(f', {NU}')[0]}")
+            write_picture(figure, out)
     except (ConfigError, StoreError, ContinError) as error:
         complain(f"error: {error}")
         return 2
@@ -80,16 +86,6 @@ def main(argv=None) -> int:
     told = f"{len(found)} folds, {branch.titled(names[0])} from {ends[0]:.6g} to {ends[1]:.6g}{why}\nwritten to {out}\n"
     write_output(told if options.out else "")
     return 0
-
-
-def _figure(branch: StoredBranch, names, values):
-    from matplotlib.figure import Figure
-
-    axes = (figure := Figure(figsize=(6, 4.2), layout="constrained")).subplots()
-    axes.plot(*values, color="black")
-    across, up = (branch.axis(name)[1] for name in names)
-    axes.set(xlabel=across, ylabel=up, title=f"folds of {branch.caption.partition(f', {NU}')[0]}")
-    return figure
 
 
 if __name__ == "__main__":

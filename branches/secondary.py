@@ -48,7 +48,12 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)
     graph = read(folder) if (folder / DIAGRAM).exists() else new_graph()
-    old = _remove_secondaries(graph, primaries)
+    old = json.loads(graph.graph.get("switches", "[]"))
+    files = {switch["file"] for switch in old if switch["primary"] in primaries and "file" in switch}
+    edges = graph.edges(keys=True, data=True)
+    graph.remove_edges_from([(a, b, key) for a, b, key, data in edges if data["file"] in files])
+    graph.remove_nodes_from([name for name, degree in list(graph.degree) if degree == 0])
+    old = [switch for switch in old if switch["primary"] not in primaries]
     there = {data["file"] for _, _, data in graph.edges(data=True)}
     for name, branch in primaries.items():
         write_bytes(folder / name, (result if result.is_file() else result / name).read_bytes())
@@ -77,16 +82,6 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
     if not found:
         raise StoreError(f"{str(result)!r} holds no branch with its index on the cell; run its scene with stability: true")
     return found
-
-
-def _remove_secondaries(graph, primaries) -> list[dict]:
-    """Remove the secondary branches of these primary branches from a diagram; return the attempts for other branches."""
-    switches = json.loads(graph.graph.get("switches", "[]"))
-    files = {switch["file"] for switch in switches if switch["primary"] in primaries and "file" in switch}
-    edges = graph.edges(keys=True, data=True)
-    graph.remove_edges_from([(a, b, key) for a, b, key, data in edges if data["file"] in files])
-    graph.remove_nodes_from([name for name, degree in list(graph.degree) if degree == 0])
-    return [switch for switch in switches if switch["primary"] not in primaries]
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,12 @@ def parse(text: str, name: str, settings: Sequence[str] = ()) -> Scene | Sweep:
         parts = key.strip().split(".")
         if not equals or "" in parts:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
-        _put(values, parts, read(value, f"--set {plain(key)}"))
+        fields, value = values, read(value, f"--set {plain(key)}")
+        for part in parts[:-1]:
+            fields = fields.setdefault(part, {})
+            if not isinstance(fields, dict):
+                raise ConfigError(f"--set {plain('.'.join(parts))}: {part!r} has no fields")
+        fields[parts[-1]] = value
     kind: type[Scene] = ClosedScene
     if "strips" in values:
         from branches.scene.network import NetworkScene as kind
@@ -142,14 +147,6 @@ def difference(stored: Scene, scene: Scene, ignored: Sequence[str] = ()) -> str:
         if a[name] != b[name]:
             return f"{name} = {a[name]!r} there, {b[name]!r} here"
     return ""
-
-
-def _put(values: dict, path: list[str], value: object) -> None:
-    for part in path[:-1]:
-        values = values.setdefault(part, {})
-        if not isinstance(values, dict):
-            raise ConfigError(f"--set {plain('.'.join(path))}: {part!r} has no fields")
-    values[path[-1]] = value
 
 
 def _at(value: object, pattern: Sequence[str], place: tuple = ()) -> Iterator[tuple[tuple, Any]]:

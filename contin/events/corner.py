@@ -126,19 +126,13 @@ def comes_near(test: Event, before: Trial, trial: Trial) -> float:
 
     It may be positive inside where both ends are negative.
     """
-    values = [test.function(between) for between in _inside(before, trial)]
-    best = int(np.argmax(values))
-    return _PARTS[best] if values[best] > -_NEAR * max(abs(before.value(test)), abs(trial.value(test))) else 0.0
-
-
-@functools.lru_cache(maxsize=1)
-def _inside(before: Trial, trial: Trial) -> list[Trial]:
-    """Return the cubic through both ends of a step at some parts of it."""
     ahead = trial.x - before.x
     length = np.sqrt(inner(trial.system, ahead, ahead))
     a, b = length * before.tangent, length * trial.tangent
     cubic = (before.x + s * (a + s * (3 * ahead - 2 * a - b + s * (a + b - 2 * ahead))) for s in _PARTS)
-    return [Trial.without_tangent(trial.system, x) for x in cubic]
+    values = [test.function(Trial.without_tangent(trial.system, x)) for x in cubic]
+    best = int(np.argmax(values))
+    return _PARTS[best] if values[best] > -_NEAR * max(abs(before.value(test)), abs(trial.value(test))) else 0.0
 
 
 def _level(slopes: Array, x: Array, part: float, least: float | None = None) -> Any:

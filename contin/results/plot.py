@@ -171,7 +171,9 @@ def plot(
     for column_name in columns:
         named |= _draw(points, (x, column_name), pieces, named, (axes, color))
         if errors:
-            _bars(points, (x, column_name), axes)
+            across, up = (column(points, name) for name in (x, column_name))
+            bars = [[error_bar(point, name) for point in points] for name in (x, column_name)]
+            axes.errorbar(across, up, xerr=bars[0], yerr=bars[1], fmt="none", ecolor=Colour.GREY, capsize=2, zorder=1.2)
     across, up = axes.dataLim.intervalx, axes.dataLim.intervaly
     for shown, (low, high), limit in (([x], across, axes.set_xlim), (columns, up, axes.set_ylim)):
         size, error = max(abs(low), abs(high)), np.nanmax([0.0, *(error_bar(point, one) for point in points for one in shown)])
@@ -220,12 +222,6 @@ def _draw(
         meaning = f"discretization error above {_VISIBLE:g}"
         axes.scatter(across[doubtful], up[doubtful], s=30, marker="x", color=Colour.GREY, label=once(meaning), zorder=3)
     return named
-
-
-def _bars(points: Sequence[Point], names: tuple[str, str], axes: Axes) -> None:
-    """Draw the estimated errors of both columns as bars; see `error_bar`."""
-    (across, up), bars = (column(points, name) for name in names), [[error_bar(p, name) for p in points] for name in names]
-    axes.errorbar(across, up, xerr=bars[0], yerr=bars[1], fmt="none", ecolor=Colour.GREY, capsize=2, zorder=1.2)
 
 
 def error_bar(point: Point, name: str) -> float:

@@ -112,7 +112,12 @@ def _image(branch: Branch) -> bytes:
         at = next((i for i, system in enumerate(systems) if system is point.system), len(systems))
         if at == len(systems):
             systems.append(point.system)
-            arrays |= _arrays_of(point.system, at)
+            base = point.system.solution
+            if point.system.on_curve and getattr(point.system, "kind", "") not in _curves(base):
+                raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")
+            if base.stored is None:
+                raise ProblemError(f"branch: points of a {type(base).__name__} are not stored; keep their columns")
+            arrays |= {f"{name}{at}": array for name, array in base.stored.items()}
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
         arrays |= {f"{name}{number}": array for name, array in finding_of(point.details).arrays.items()}
         fields = {name: getattr(point, name) for name in _FIELDS}
@@ -143,17 +148,6 @@ def _said(statement: dict[str, Any]) -> str:
     kind = "a problem " if statement["kind"] == _UNTOLD else statement["kind"]
     symmetry = "" if statement["symmetry"] in (None, _UNTOLD) else f"; symmetry {statement['symmetry']}"
     return f"{kind}(states {checks.listed(statement['states'])}; parameters {checks.listed(statement['names'])}{symmetry})"
-
-
-def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
-    """Return what is stored of a discretized problem; raise ProblemError if it is of a kind that is not stored."""
-    base = system.solution
-    if system.on_curve and getattr(system, "kind", "") not in _curves(base):
-        raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")
-    arrays: dict[str, Array] | None = base.stored
-    if arrays is None:
-        raise ProblemError(f"branch: points of a {type(base).__name__} are not stored; keep their columns")
-    return {f"{name}{number}": array for name, array in arrays.items()}
 
 
 def _curves(base: Discretization) -> dict[str, Any]:
