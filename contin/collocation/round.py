@@ -37,7 +37,8 @@ class Monodromy(NamedTuple):
     ``jacobian`` (N d, n, n) is given; ``order`` (n,) are the states by which its columns stand in a linearized system. An
     interval may have the ``length``, times the size of a rate; longer ones are divided, and those of each begin in ``starts``
     (N + 1,) among the ``matrices``, which are transitions and, where there is a symmetry, its inverse ``turn`` (0 or 1, n, n).
-    ``real`` and ``imaginary`` (n,) are the logarithms found.
+    ``real`` and ``imaginary`` (n,) are the logarithms found. ``flow`` is the field at the ``ends`` where matrices begin,
+    ``normal`` are transitions across it.
     """
 
     points: Vector
@@ -60,6 +61,10 @@ class Monodromy(NamedTuple):
     product: Product
     real: Vector
     imaginary: Vector
+    ends: Matrix
+    flow: Matrix
+    normal: Stack
+    others: Product
 
 
 def monodromy_of(system: Any, parts: int = 0) -> Monodromy:
@@ -73,7 +78,8 @@ def monodromy_of(system: Any, parts: int = 0) -> Monodromy:
         np.empty(intervals + 1, np.int64), turn, system.gauss_weights, system.order_of_states, length,
         int(system.autonomous), int(planar), np.empty((intervals * d, n, n)), np.empty((d, n, n)), np.empty(1),
         np.empty((d * n, (d + 1) * n)), np.empty((d + 1) * n, np.int64), matrices, product_of(len(matrices), n),
-        np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n), np.empty((len(matrices), n)), np.empty((len(matrices), system._field.count)),
+        np.empty((len(matrices), n - 1, n - 1)), product_of(len(matrices), max(n - 1, 1)),
     )  # fmt: skip
 
 
@@ -90,10 +96,12 @@ def ends_of_parts(mesh: Array, room: Monodromy) -> Array:
 
 
 @kernel(reorder=False, last=True)
-def fill_multipliers(room: Monodromy, known: int) -> int:
-    """Fill in the logarithms, or put right by Liouville's formula those that are ``known``; return what comes of it."""
+def fill_multipliers(room: Monodromy, drifted: int) -> int:
+    """Fill in the logarithms, or where one has ``drifted`` with the flow split off; return what comes of it."""
     real, imaginary, n = room.real, room.imaginary, room.real.size
-    if not known:
+    if drifted:
+        _split_flow(room, room.turn.shape[0] + room.starts[room.h.size])
+    else:
         room.starts[0] = 0
         for j in range(room.h.size):
             room.starts[j + 1] = room.starts[j] + (1 if room.planar else _parts(room, j))
@@ -127,6 +135,49 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         real[0], real[1] = max(one, total), min(one, total)
         imaginary[0] = imaginary[1] = 0.0
     return KNOWN
+
+
+@helper
+def _split_flow(room: Monodromy, count: int) -> None:
+    """Fill in the logarithms where each matrix takes the direction of the flow to the next one, which is split off.
+
+    With v_j of unit length and an orthonormal basis Q_j of what is normal to it, of a reflection,
+
+        F_j [v_j-1  Q_j-1] = [v_j  Q_j] [ a_j   *  ]
+                                        [  0   B_j ]
+
+    and the eigenvalues are the product of the numbers a_j, which are positive, and those of the product of the B_j. What
+    the matrices leave of the zeros is round-off and dropped: it would grow with the product.
+    """
+    n, total, at = room.real.size, 0.0, room.real.size - 1
+    for j in range(count):
+        size = 0.0
+        for a in range(n):
+            size += room.flow[j, a] ** 2
+        for a in range(n):
+            room.ends[j, a] = room.flow[j, a] / math.copysign(math.sqrt(size), room.flow[j, 0]) + (1.0 if a == 0 else 0.0)
+    for j in range(count):
+        left, right, matrix = room.ends[(j + 1) % count], room.ends[j], room.matrices[j]
+        for side in range(2):
+            for a in range(n):
+                part = 0.0
+                for b in range(n):
+                    part += matrix[b, a] * left[b] / left[0] if side else matrix[a, b] * right[b] / right[0]
+                for b in range(n):
+                    if side:
+                        matrix[b, a] -= part * left[b]
+                    else:
+                        matrix[a, b] -= part * right[b]
+        total += math.log(abs(matrix[0, 0]))
+        for a in range(n - 1):
+            for b in range(n - 1):
+                room.normal[j, a, b] = matrix[a + 1, b + 1]
+    if n > 1:
+        fill_logarithms(room.normal[:count], room.others, room.real[: n - 1], room.imaginary[: n - 1])
+    while at > 0 and not room.real[at - 1] >= total:
+        room.real[at], room.imaginary[at] = room.real[at - 1], room.imaginary[at - 1]
+        at -= 1
+    room.real[at], room.imaginary[at] = total, 0.0
 
 
 @helper

@@ -34,8 +34,9 @@ from contin.events.spectra import (
     may_cross_between,
     passes_inside,
 )
+from contin.functions.interpreter import Points, run_loaded
 from contin.kernels.kernel import kernel
-from contin.kernels.kernel_parts import Matrix, Stack, Vector, helper
+from contin.kernels.kernel_parts import Matrix, Vector, helper
 from contin.levels import APART
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends
@@ -141,15 +142,23 @@ def ends_are_calm(mesh: Mesh, factored: Factored, before: Relations, after: Rela
 
 
 @helper
-def _keeps(room: Monodromy, spectra: Spectra, jacobian: Stack, row: int) -> bool:
+def _keeps(work: Workspace, room: Monodromy, spectra: Spectra, unknowns: Array, row: int) -> bool:
     """Keep the multipliers where it was linearized, but for the one that is 1, in a row; return whether all are clear."""
-    n, at = room.real.size, 0
+    codes, mesh, values = work
+    n, at, jacobian = room.real.size, 0, values.jacobian
     for q in range(jacobian.shape[0]):
         for c in range(n):
             b = room.order[c]
             for a in range(n):
                 room.jacobian[q, a, b] = jacobian[q, a, c]
     known = fill_multipliers(room, 0)
+    if known == DRIFTED and room.starts[room.h.size] == room.h.size and not room.turn.shape[0]:
+        for j in range(room.h.size):
+            for a in range(n):
+                room.ends[j, a] = unknowns[j * room.points.size * n + a]
+        points = Points(mesh.times[: room.h.size], room.ends[: room.h.size], values.none)
+        run_loaded(codes.field, values.p, points, room.flow[: room.h.size], values.nothing)
+        known = fill_multipliers(room, 1)
     if known not in (KNOWN, DRIFTED):
         return False
     trivial, least = nearest_to_one(room) if room.autonomous else (-1, 0.0)
@@ -181,7 +190,7 @@ def multipliers_ask(
         spectra.moved[0] = math.inf
     for a in range(spectra.real.shape[1]):
         spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
-    if not _keeps(room, spectra, values.jacobian, LAST):
+    if not _keeps(work, room, spectra, new, LAST):
         return ASK
     if longer == 0.0:
         return AWAY
@@ -194,7 +203,7 @@ def multipliers_ask(
             if clear:
                 fill_place(spectra, place)
                 one_call.evaluate(codes, mesh, values, spectra.place, True)
-                clear = _keeps(room, spectra, values.jacobian, place)
+                clear = _keeps(work, room, spectra, spectra.place, place)
         one_call.evaluate(codes, mesh, values, new, True)  # values are those at the end again
         for i in range(x.size):
             values.at[i] = new[i]

@@ -33,7 +33,7 @@ from contin.events.normal_forms import Coefficient, at_special_point
 from contin.levels import APART, DOUBLED, LOCATED, ROUGH
 from contin.linalg.blocks import Blocks, Factors
 from contin.linalg.condensation import Factorization
-from contin.linalg.periodic import interval_matrices, log_eigenvalues, log_eigenvalues_along
+from contin.linalg.periodic import interval_matrices, log_eigenvalues
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.statement import PERIOD, rounds_of
 
@@ -503,9 +503,7 @@ class CycleCollocation(PeriodicCollocation):
             ends = self._scaled_states(x)[:: self.degree].copy()  # of the intervals
             if room.starts[-1] > self.intervals:
                 ends = self._interpolated(x, ends_of_parts(self.mesh, room))
-            flow = self.rates(x, ends)
-            values = log_eigenvalues_along(room.matrices[:count], np.concatenate([flow[:count], flow[:1]]))
-            room.real[:], room.imaginary[:] = values.real, values.imag
+            room.flow[:count, : self._n] = self.rates(x, ends)[:count]
             fill_multipliers(room, 1)
         return self._across_jumps(x, room)
 

@@ -113,41 +113,6 @@ def _first_basis(n: int) -> Array:
     return np.ascontiguousarray(np.linalg.qr(generator("periodic").standard_normal((n, n)))[0].T)
 
 
-def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
-    """Return the logarithms of the eigenvalues where each factor takes one known vector to the next, shape (n,), largest first.
-
-    With v_j of unit length and an orthonormal basis Q_j of what is normal to it,
-
-        F_j [v_j-1  Q_j-1] = [v_j  Q_j] [ a_j   *  ]
-                                        [  0   B_j ]
-
-    and the eigenvalues are the product of the numbers a_j, which must be positive, and those of the product of the B_j. What
-    the factors leave of the zeros is round-off and dropped: it would grow with the product.
-
-    - ``factors`` (ndarray, shape (N, n, n))
-    - ``vectors`` (ndarray, shape (N + 1, n)): v_0 ... v_N, of any length; the last is a positive multiple of the first. Where
-      one is zero, all eigenvalues are NaN.
-
-    Examples
-    --------
-    >>> shear = np.array([[1.0, 0.5], [0.0, 4.0]])
-    >>> print(np.exp(log_eigenvalues_along(np.array([shear, shear]), np.array([[1, 0], [1, 0], [1, 0]]))).real.round(9))
-    [16.  1.]
-    """
-    n = factors.shape[-1]
-    with np.errstate(invalid="ignore"):
-        units = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-    mirrors = units + np.where(units[:, :1] < 0, -1.0, 1.0) * np.eye(n)[0]
-    reflections = np.eye(n) - 2 * mirrors[:, :, None] * mirrors[:, None] / np.sum(mirrors**2, axis=1)[:, None, None]
-    normal = reflections[:, :, 1:]
-    along = np.einsum("ja,jab,jb->j", units[1:], factors, units[:-1])
-    with np.errstate(divide="ignore"):
-        one = np.log(np.abs(along)).sum(keepdims=True)
-    rest = normal[1:].transpose(0, 2, 1) @ factors @ normal[:-1]
-    values = np.concatenate([one, log_eigenvalues(rest)])
-    return values[np.argsort(-values.real, kind="stable")]
-
-
 @kernel(reorder=False, last=True)
 def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
     """Iterate from the first basis until groups of eigenvalues are apart; fill the groups, and return their number."""

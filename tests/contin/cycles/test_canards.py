@@ -1,11 +1,14 @@
 """Canard explosions: a parameter stays within 1e-10 or less while the cycle grows, and multipliers span 1e100 and more."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import contin
 from contin import AlgebraicProblem
-from contin.linalg.periodic import log_eigenvalues, log_eigenvalues_along
+from contin.collocation.round import _split_flow
+from contin.linalg.periodic import log_eigenvalues, product_of
 
 
 def van_der_pol(u, p):
@@ -72,7 +75,11 @@ def test_eigenvalues_with_a_known_vector_split_off():
         along = [vectors[:, i].real]
         for factor in factors:
             along.append(factor @ along[-1])
-        found = log_eigenvalues_along(factors, np.array(along))
+        real, imaginary, others = np.empty(4), np.empty(4), product_of(6, 3)
+        given = {"flow": np.array(along), "ends": np.empty((6, 4)), "matrices": factors.copy(), "normal": np.empty((6, 3, 3))}
+        _split_flow(SimpleNamespace(real=real, imaginary=imaginary, others=others, **given), 6)
+        found = real + 1j * imaginary
+        assert np.all(np.diff(real) <= 0)
         assert np.sort_complex(np.exp(found)) == pytest.approx(np.sort_complex(values), rel=1e-9)
         assert np.exp(found) == pytest.approx(np.exp(log_eigenvalues(factors)), rel=1e-9)
 
