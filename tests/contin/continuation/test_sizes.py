@@ -266,7 +266,7 @@ def test_what_cutting_off_an_infinite_time_leaves_is_no_size(monkeypatch):
     """The orbit does not move with alpha, but for 1e-9 of z: a search must not take that for the size of z."""
     values = {"a": 0.0, "c": -2.0, "alpha": 0.0, "beta": 1.0, "gamma": 0.0, "mu": 0.0, "nu": 0.0}
     orbit = solve(ConnectionProblem(sandstede, ["x", "y", "z"], values, unstable=1), leaf(10), {"time": 20}, free=["nu"])
-    first = trace(orbit, free=["a", "nu"], limits={"a": (-0.5, 0.25)})
+    first = trace(orbit, free=["a", "nu"], limits={"a": (-0.5, 0.25)}, scales={"a": 1.0})
     monkeypatch.setattr(scaling._FirstPoint, "usual", lambda *_: False)
     branch = trace(first[-1], free=["alpha", "nu"], limits={"alpha": (-1, 1.6952)})
     assert branch[0].system.scales.are_one and len(branch) < 12
