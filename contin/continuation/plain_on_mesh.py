@@ -90,6 +90,7 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> fl
         row[i] = weights[i] * path.tangents[number - 1, i]
         start += row[i] * x[i]
     step = rules.first_length(frame, control, path, number)
+    low = COLLAPSED * abs(_product(amplitude, x))  # below it a cycle has become an equilibrium, as in `collapsed`
     while True:
         rules.fill_guess(attempt, path, number, step)
         values.targets[last] = start + step
@@ -100,7 +101,6 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> fl
             return 0.0
         if done == one_call.FAILED and report[one_call.UPDATES + int(report[one_call.ITERATIONS]) - 1] <= STAGNANT:
             return 0.0
-        low = COLLAPSED * abs(_product(amplitude, x))  # below it a cycle has become an equilibrium, as in `collapsed`
         if done == one_call.CONVERGED and not (amplitude.size > 0 and abs(_product(amplitude, new)) < low):
             outcome = rules.judge(frame, attempt, control, path, number, step)
         if outcome == BELIEVED:

@@ -74,10 +74,10 @@ def switched(
     if doubles(point) or system.is_smooth(point.x, frequency_of(point)):
         return found, x, way * along
     tangent = way * along  # terms like v |v| change the parameters; along the ellipse alone no step is believed, however short
-    size = ROUGH / np.abs(tangent).max()
     beside: Any = found
-    beside, row = beside.with_reference(x + size * tangent), found.weights * tangent
-    rates = (correct(beside, x + size * tangent, row, row @ (x + size * tangent)).x - x) / size
+    size = ROUGH / np.abs(tangent).max()
+    there, row = x + size * tangent, beside.weights * tangent
+    rates = (correct(beside.with_reference(there), there, row, row @ there).x - x) / size
     return found, x, np.append(tangent[: found.state_size], rates[found.state_size :])
 
 
