@@ -10,7 +10,7 @@ from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
 from contin.continuation import plain_on_mesh
 from contin.cycles import equations as cycles
 from contin.events import hopf
-from contin.search import orbits
+from contin.search import motions, orbits
 
 
 def circle(u, p):
@@ -118,9 +118,9 @@ def test_motions_settle_by_an_explicit_method_and_by_others(mu, period):
     for field in (van_der_pol, unrecorded):
         problem = CycleProblem(field, ["x", "v"], {"mu": mu})
         given = orbits._field(problem, problem.parameters)
-        done = orbits._integrated(given, np.array([2.0, 0.0]), 3 * period, 1e-9)
-        assert (orbits._explicit(given, done.y[:, 0], 3 * period, 1e-9) is None) == (mu > 1 or field is unrecorded)
-        first, second, *_ = orbits._passages(done.t, lambda t, sol=done.sol: sol(t)[0] - 1.5)
+        done = motions.integrated(given, np.array([2.0, 0.0]), 3 * period, 1e-9)
+        assert (motions.explicit(given, done.y[:, 0], 3 * period, 1e-9) is None) == (mu > 1 or field is unrecorded)
+        first, second, *_ = motions.passages(done.t, lambda t, sol=done.sol: sol(t)[0] - 1.5)
         assert second - first == pytest.approx(period, rel=1e-4)
 
 
