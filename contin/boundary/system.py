@@ -639,7 +639,7 @@ class Collocation(Composed):
         """What the estimates of errors on this mesh share."""
         return Defect(self)
 
-    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+    def discretization_error(self, x: Array, factors: Factors, columns: Any) -> float:
         """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
         return self.defect.error(x, factors, columns)
 

@@ -22,12 +22,13 @@ where the mesh is much too coarse it is large, and no more than that.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.collocation.assembly import at_points
 from contin.collocation.corners import Switching
 from contin.collocation.mesh import basis, interpolation, near
 from contin.collocation.newton import Codes, Values, Workspace, put_free
@@ -35,7 +36,7 @@ from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.levels import LOCATED
-from contin.linalg.condensation import Factored, solve
+from contin.linalg.condensation import Factored, Factorization, solve
 from contin.text import shown
 
 
@@ -118,15 +119,27 @@ class Defect:
         self.least_sizes = self._least_sizes()
         #: Mesh points where the right-hand side jumps: it has no value there that holds on both sides.
         self.broken = near(system.mesh, system.breaks, system.mesh[-1] - system.mesh[0])
+        self._rooms: dict[int, Estimate | None] = {}  # by thread
 
-    def error(self, x: Array, factors: Any, columns: Mapping[str, float]) -> float:
+    @property
+    def room(self) -> Estimate | None:
+        """Where a kernel makes the estimate; None where Python does: the functions are not recorded, or have jumps."""
+        system, thread = self.system, threading.get_ident()
+        if thread not in self._rooms:
+            smooth = system.plain and system.workspace is not None and not system.breaks.size and not system.has_selections
+            self._rooms[thread] = estimate_of(self) if smooth and system.size == system.equations + 1 else None
+        return self._rooms[thread]
+
+    def error(self, x: Array, factors: Any, columns: Any) -> float:
         """Return the largest estimated error of states, rates, free parameters and integrals, relative to 1 + size.
 
         It is NaN where the functions are not finite. States and rates (times the length of the domain) are divided by the sizes
         of the states. The size of an integral is that of its integrand, integrated, plus its size where all unknowns are as
         large as their sizes: an energy may vanish. Factors are those of [F_x; row] at the solution x or close to it;
-        ``columns`` are the integrals on this mesh, by name.
+        ``columns[name]`` are the integrals on this mesh; a kernel takes its own.
         """
+        if isinstance(factors, Factorization) and factors.unknowns == self.system.size and (room := self.room) is not None:
+            return estimate(self.system.workspace, factors.room, room, x)
         system, h, tables, n = self.system, self.h, self.tables, self.n
         points, left = np.empty((self.times.size, n)), np.zeros(system.equations + 1)
         at_mesh = x[: system.state_size].reshape(-1, n)[:: system.degree].copy()
@@ -367,7 +380,7 @@ def _fill_field(codes: Codes, values: Values, times: Array, states: Array, found
 
 @kernel
 def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> float:
-    """Return `Defect.error` at x, for factors right there and states ``work.values.points`` at its Gauss points."""
+    """Return `Defect.error` at x, for factors right there."""
     codes, mesh, values = work
     n, h = room.points.shape[1], mesh.h
     degree, size = room.tables.slope.shape[0], x.size
@@ -375,6 +388,7 @@ def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> 
     for b in range(room.known.size):
         room.known[b] = 0.0
     if room.known.size:
+        at_points(mesh.tables.value, x, values.points)
         run_loaded(room.integrals, values.p, Points(mesh.times, values.points, values.none), room.at_gauss, values.nothing)
         for q in range(room.quadrature.size):
             for b in range(room.known.size):
@@ -399,4 +413,5 @@ def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> 
         given = Points(room.times, room.points, values.none)
         run_loaded(room.integrals, values.p, given, room.integrands, values.nothing)
         largest = largest_miss(room.weights, room.integrands, room.known, room.least, largest)
+    put_free(mesh, values, x)
     return float(largest)

@@ -17,7 +17,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.collocation import newton as one_call
-from contin.collocation.defect import estimate, estimate_of
+from contin.collocation.defect import estimate
 from contin.collocation.round import larger
 from contin.continuation import plain_on_mesh as on_mesh
 from contin.continuation import rules
@@ -69,9 +69,7 @@ def lane_of(
 
 def _is_smooth(system: Any) -> bool:
     """Return whether a kernel makes steps on a mesh: functions are recorded, and have no jumps that the mesh must know of."""
-    if not system.plain or system.workspace is None:
-        return False
-    return system.intervals > 1 and not system.breaks.size and not system.has_selections and system.size == system.equations + 1
+    return system.plain and system.intervals > 1 and system.defect.room is not None
 
 
 def _quotient(size: int) -> Quotient:
@@ -197,7 +195,7 @@ class MeshLane(Lane):
         k, segments = len(system.free), self._work.mesh.whole.last
         self._relations = [Relations.unfilled(system.intervals, n, k, segments) for _ in range(2)]
         self._quotient, self._watched = _quotient((segments + 1) * n + k), settings.branch_points
-        self.spectra, self._estimate = spectra_of(n - autonomous, system.size), estimate_of(system.defect)
+        self.spectra, self._estimate = spectra_of(n - autonomous, system.size), system.defect.room
         self._left: tuple[Array, _Begun] | None = None
 
     def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:

@@ -73,7 +73,7 @@ def at_branch_point(trial: Trial) -> Accuracy:
     if not system.intervals or (system.size_of_solutions is not None and not np.ptp(system.states(trial.x), axis=0).any()):
         return Accuracy(0.0)
     factors: Any = _Bordered(trial)
-    return Accuracy(system.discretization_error(trial.x, factors, trial.functionals))
+    return Accuracy(system.discretization_error(trial.x, factors, trial))
 
 
 #: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the

@@ -73,10 +73,10 @@ class Discretization(Equations, Protocol):
     def nodes(self) -> Array:
         """Values of t at the nodes, where the states are given; shape (K,)."""
 
-    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+    def discretization_error(self, x: Array, factors: Factors, columns: Any) -> float:
         """Return the estimated error of a solution x that is due to the mesh, relative to 1 + size: 0 without a mesh.
 
-        ``factors`` are those of [F_x; row] at x or close to it, ``columns`` the functionals of x. Kinds of system with a mesh
+        ``factors`` are those of [F_x; row] at x or close to it, ``columns[name]`` a functional of x. Kinds with a mesh
         that say nothing return NaN.
         """
         return float("nan") if self.intervals else 0.0

@@ -157,7 +157,7 @@ class Trial:
         if self._discretization_error is None:
             if self.factors is None:
                 self.refactor(self.system.weights * self.tangent)
-            self._discretization_error = self.system.discretization_error(self.x, self.factors, self.functionals)
+            self._discretization_error = self.system.discretization_error(self.x, self.factors, self)
         return self._discretization_error
 
     def __getitem__(self, name: str) -> float:
