@@ -234,7 +234,7 @@ class Fields(Spectral, Collocation):
         if slopes is not None:
             found += np.einsum("qm,rb->qrmb", np.tile(self.basis.slope, (self.intervals, 1)), slopes)
         rows = np.arange(found.shape[0] * found.shape[1]).reshape(*found.shape[:2], 1, 1)
-        nodes = np.repeat(self._by_interval, self._d, axis=0)
+        nodes = np.repeat(self.by_interval, self._d, axis=0)
         return found, rows, nodes[:, None, :, None] * self._n + np.arange(self._n)
 
     def _rates(self, x: Array) -> Array:

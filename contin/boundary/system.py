@@ -19,7 +19,7 @@ from contin import draws
 from contin.arrays import Array, Indices, Places
 from contin.boundary.crossings import Crossing, crossing_places, crossings, frozen, next_places, outcomes, stepped
 from contin.boundary.grazing import contradiction, grazing, jumping, touch_ahead, with_sides_near
-from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
+from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row, interpolate
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
 from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near
@@ -144,7 +144,6 @@ class Collocation(Composed):
         self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
         self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
         self._h_points = np.repeat(h, degree)[:, None]
-        self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
         self.state_size = (self.intervals * degree + 1) * self._n
         self.size = self.state_size + len(self.free)
         self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
@@ -161,7 +160,7 @@ class Collocation(Composed):
     @property
     def by_interval(self) -> Indices:
         """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
-        return self._by_interval
+        return self._d * np.arange(self.intervals)[:, None] + np.arange(self._d + 1)
 
     # --- values --------------------------------------------------------------------------------------------------
 
@@ -190,14 +189,9 @@ class Collocation(Composed):
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x."""
-        return self._interpolator(times)(x)
-
-    def _interpolator(self, times: Array) -> Carrier:
-        """Return the function that evaluates the piecewise polynomial of values at times in the domain."""
-        j = np.minimum(np.maximum(np.searchsorted(self.mesh, times, side="right") - 1, 0), self.intervals - 1)
-        matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
-        places = self._by_interval[j]
-        return lambda x: np.einsum("ij,ijk->ik", matrix, self._scaled_states(x)[places])
+        values = np.empty((times.size, self._n))
+        interpolate(self.basis.nodes, self.basis.barycentric, self.mesh, times, np.ascontiguousarray(x), values)
+        return values
 
     def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:
         """Return the states divided by their sizes at ``places`` (K,) of an interval, between 0 and 1, shape (K, n)."""
@@ -218,8 +212,16 @@ class Collocation(Composed):
 
     def carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns from this mesh to the mesh of another system."""
-        states = self._interpolator(other.nodes)
-        return self._between_scales(lambda x: np.concatenate([states(x).ravel(), x[self.state_size :]]), other)
+        given = self.basis.nodes, self.basis.barycentric, self.mesh, other.nodes
+        size, last = len(given[-1]) * self._n, self.state_size
+
+        def carry(x: Array) -> Array:
+            carried = np.empty(size + len(x) - last)
+            interpolate(*given, np.ascontiguousarray(x), carried[:size].reshape(-1, self._n))
+            carried[size:] = x[last:]
+            return carried
+
+        return self._between_scales(carry, other)
 
     def _copied(self) -> Self:
         """Return a copy with all that was computed, which ``copy.copy`` leaves out."""

@@ -28,6 +28,36 @@ def at_points(value: Matrix, x: ReadOnlyVector, points: Matrix) -> None:
                     row[a] += factor * x[start + a]
 
 
+@kernel(reorder=False)
+def interpolate(
+    nodes: Vector, barycentric: Vector, mesh: Vector, times: ReadOnlyVector, x: ReadOnlyVector, values: Matrix
+) -> None:
+    """Fill ``values`` (m, n) with those of the piecewise polynomial at ``times`` (m,), from the nodal values in x.
+
+    Outside the mesh it is that of the interval beside it.
+    """
+    d, n, last = nodes.size - 1, values.shape[1], mesh.size - 2
+    j = 0
+    for q in range(times.size):
+        while j < last and times[q] >= mesh[j + 1]:
+            j += 1
+        while j > 0 and times[q] < mesh[j]:
+            j -= 1
+        place, total, exact = (times[q] - mesh[j]) / (mesh[j + 1] - mesh[j]), 0.0, -1
+        for a in range(n):
+            values[q, a] = 0.0
+        for node in range(d + 1):
+            if place == nodes[node]:
+                exact = node
+                break
+            factor, first = barycentric[node] / (place - nodes[node]), (j * d + node) * n
+            total += factor
+            for a in range(n):
+                values[q, a] += factor * x[first + a]
+        for a in range(n):
+            values[q, a] = values[q, a] / total if exact < 0 else x[(j * d + exact) * n + a]
+
+
 @kernel
 def collocate(
     n: int, slope: Matrix, weights: Vector, h: Vector, x: ReadOnlyVector, field: Matrix, boundary: Matrix, residual: Vector
