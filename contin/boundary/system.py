@@ -23,7 +23,7 @@ from contin.collocation.assembly import Bordering, Tables, assemble, at_points, 
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
 from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near
-from contin.collocation.newton import Values, Workspace, linearize_on_mesh, workspace
+from contin.collocation.newton import Codes, Values, Workspace, codes_of, linearize_on_mesh, workspace
 from contin.collocation.projection import Projections, projections
 from contin.core.protocol import Carrier, Discretization
 from contin.core.step import State, Stop
@@ -313,7 +313,7 @@ class Collocation(Composed):
         if pieces is None and self._pieces is None:
             return self
         other = self._copied()
-        for name in (*_ON_A_MESH, "_layout", "_columns", "_components", "outcomes"):
+        for name in (*_ON_A_MESH, "_layout", "_columns", "_codes", "_components", "outcomes"):
             vars(other).pop(name, None)
         other._pieces, other._crosses = pieces, crosses
         other._take_pieces(self.mesh)
@@ -666,7 +666,7 @@ class Collocation(Composed):
         """
         return np.empty((0, self.size)), np.empty(0)
 
-    @property
+    @functools.cached_property
     def projections(self) -> Projections:
         """The room in which a kernel evaluates projection conditions: here none."""
         none, field = np.zeros((self._n, len(self.parameters))), self._field.load()
@@ -685,20 +685,29 @@ class Collocation(Composed):
         """The arrays in which a kernel corrects points; None where Python evaluates functions, and on very long meshes."""
         thread = threading.get_ident()
         if thread not in self._workspaces:  # kernels of two threads run side by side
-            self._workspaces[thread] = self._made_workspace()
+            self._workspaces[thread] = self._made_workspace(thread)
         return self._workspaces[thread]
 
     @functools.cached_property
     def _workspaces(self) -> dict[int, Workspace | None]:
         return {}
 
-    def _made_workspace(self) -> Workspace | None:
+    @functools.cached_property
+    def _codes(self) -> dict[int, Codes]:
+        """By thread; copies on other meshes have the same."""
+        return {}
+
+    def _made_workspace(self, thread: int) -> Workspace | None:
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
         if own is None or not recorded or self._components or self.outcomes.size or self.size < self.equations:
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
-        return workspace(self, rows) if not is_large(numbers) else None
+        if is_large(numbers):
+            return None
+        if thread not in self._codes:
+            self._codes[thread] = codes_of(self)
+        return workspace(self, self._codes[thread], rows)
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""

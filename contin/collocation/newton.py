@@ -89,11 +89,15 @@ def put_free(mesh: Mesh, values: Values, x: Array) -> None:
         values.p[mesh.free[i]] = x[mesh.states + i]
 
 
-def workspace(system: Any, rows: int) -> Workspace:
+def codes_of(system: Any) -> Codes:
+    """Return the programs of a system, the same on all meshes."""
+    field, ends, (of_field, of_ends) = system._field, system._boundary, system._columns
+    return Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
+
+
+def workspace(system: Any, codes: Codes, rows: int) -> Workspace:
     """Return the work space of a system on a mesh with so many linear conditions besides, which each call fills."""
-    n, field, ends = system._n, system._field, system._boundary
-    of_field, of_ends = system._columns
-    codes = Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
+    n, field, ends, (of_field, of_ends) = system._n, system._field, system._boundary, system._columns
     whole = system._segments(0)
     mesh = Mesh(
         system._layout, system.tables, system._h, system.gauss_times, system._free, system.state_size, system._conditions, whole
