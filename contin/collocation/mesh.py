@@ -12,6 +12,8 @@ import numpy as np
 from contin import errors as checks
 from contin.arrays import Array
 from contin.errors import ProblemError, Within
+from contin.kernels.kernel import kernel
+from contin.kernels.kernel_parts import ReadOnlyMatrix, Vector
 from contin.levels import CORRECTED
 from contin.text import shown
 
@@ -173,25 +175,61 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
     - ``states`` (ndarray, shape (N d + 1, n)): At the nodes.
     - ``breaks`` (ndarray, optional): Places where the equations have jumps or corners: differences across them are no errors.
     """
-    d, h = basis.degree, mesh[1:] - mesh[:-1]
-    if h.size < 2:
-        return np.ones(1)
-    local = states[d * np.arange(h.size)[:, None] + np.arange(d + 1)]
-    derivative = basis.highest @ local / h[:, None] ** d
-    jumps = np.abs(derivative[1:] - derivative[:-1]) / ((h[1:] + h[:-1]) / 2)[:, None]
-    jumps = (jumps / np.maximum(1.0, np.abs(states).max(axis=0))).max(axis=1)
+    return _density(basis, mesh, states, breaks, 0.0)
+
+
+def _density(basis: Basis, mesh: Array, states: Array, breaks: Array, least: float) -> Array:
+    """Return the density; with ``least`` above 0 it is smoothed, and raised to this part of its mean."""
+    phi, jumps = np.ones(mesh.size - 1), np.zeros(mesh.size)
+    if phi.size < 2:
+        return phi
+    fill_jumps(basis.highest, mesh, states, jumps)
     if len(breaks):  # a jump there is no larger than the next ones on both sides
-        inside = near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
-        beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
+        inside = near(mesh, breaks, mesh[-1] - mesh[0])
+        inside[0] = inside[-1] = True
+        beside = np.where(inside, -1.0, jumps)
         largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
-        jumps = np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
-    both = np.empty((2, h.size))
-    both[0, 1:], both[1, :-1] = jumps, jumps
-    both[0, 0], both[1, -1] = jumps[0], jumps[-1]
-    largest = both.max(axis=0)
-    if (largest * h ** (d + 1)).max() <= basis.round_off:
-        return np.full(h.size, basis.round_off ** (1 / (d + 1)) / h.mean())
-    return np.asarray(largest ** (1 / (d + 1)))
+        jumps[1:-1] = np.where(np.logical_and(inside[1:-1], largest >= 0), np.minimum(jumps[1:-1], largest), jumps[1:-1])
+    fill_density(basis.degree, mesh, jumps, basis.round_off, least, phi)
+    return phi
+
+
+@kernel(reorder=False)
+def fill_jumps(highest: Vector, mesh: Vector, states: ReadOnlyMatrix, jumps: Vector) -> None:
+    """Raise ``jumps`` (N + 1,) at inner mesh points to the largest difference quotients of d-th derivatives, scaled."""
+    d = highest.size - 1
+    for a in range(states.shape[1]):
+        size, before = 1.0, 0.0
+        for i in range(states.shape[0]):
+            size = max(size, abs(states[i, a]))
+        for j in range(mesh.size - 1):
+            derivative = 0.0
+            for node in range(d + 1):
+                derivative += highest[node] * states[j * d + node, a]
+            derivative /= (mesh[j + 1] - mesh[j]) ** d
+            if j > 0:
+                jumps[j] = max(jumps[j], 2 * abs(derivative - before) / (mesh[j + 1] - mesh[j - 1]) / size)
+            before = derivative
+
+
+@kernel(reorder=False)
+def fill_density(d: int, mesh: Vector, jumps: Vector, round_off: float, least: float, phi: Vector) -> None:
+    """Fill the density ``phi`` (N,) from the jumps at inner mesh points; smoothed and raised, if ``least`` is above 0."""
+    last, most, total, before = phi.size - 1, 0.0, 0.0, 0.0
+    jumps[0], jumps[last + 1] = jumps[1], jumps[last]
+    for j in range(last + 1):
+        largest = max(jumps[j], jumps[j + 1])
+        most = max(most, largest * (mesh[j + 1] - mesh[j]) ** (d + 1))
+        phi[j] = largest ** (1 / (d + 1))
+    for j in range(last + 1 if most <= round_off else 0):
+        phi[j] = round_off ** (1 / (d + 1)) * (last + 1) / (mesh[last + 1] - mesh[0])
+    for j in range(last + 1 if least > 0 else 0):
+        now = phi[j]
+        phi[j] = max(now, ((before if j > 0 else now) + 2 * now + phi[min(j + 1, last)]) / 4)
+        total += phi[j] * (mesh[j + 1] - mesh[j])
+        before = now
+    for j in range(last + 1):
+        phi[j] = max(phi[j], least * total / (mesh[last + 1] - mesh[0]))
 
 
 def halved(mesh: Array) -> Array:
@@ -238,7 +276,7 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl,
     bound) over as many intervals as ``control.tolerance`` takes.
     """
     h = np.diff(mesh)
-    phi = _raised(density(basis, mesh, states, breaks), h)
+    phi = _density(basis, mesh, states, breaks, _LEAST_DENSITY)
     total = float(phi @ h)
     allowed = share(basis, control.tolerance)
     fewest = max(control.min_intervals, _A_PIECE * (len(breaks) + 1) if len(breaks) else 0)
@@ -259,14 +297,7 @@ def share(basis: Basis, tolerance: float) -> float:
 
 def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) -> Array:
     """Return a mesh of so many intervals for a solution that is given on another mesh."""
-    return _equidistributed(mesh, _raised(density(basis, mesh, states), np.diff(mesh)), intervals)
-
-
-def _raised(phi: Array, h: Array) -> Array:
-    """Return the density, smoothed and not far below its mean."""
-    padded = np.concatenate([phi[:1], phi, phi[-1:]])
-    phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
-    return np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
+    return _equidistributed(mesh, _density(basis, mesh, states, _NOWHERE, _LEAST_DENSITY), intervals)
 
 
 def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _NOWHERE) -> Array:
