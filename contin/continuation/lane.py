@@ -22,9 +22,10 @@ from contin.collocation.round import larger
 from contin.continuation import plain_on_mesh as on_mesh
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, Rooms, plain_steps
+from contin.continuation.steps import Made
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
-from contin.core.small import equations_of, linear_of
+from contin.core.small import BELIEVED, equations_of, linear_of
 from contin.core.step import State
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
@@ -38,8 +39,8 @@ from contin.results.point import Point
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
-#: The length of a step, its beginning and its end.
-Handed = tuple[float, Trial, Trial]
+#: The length of a step, its beginning, and its end with the judgement.
+Handed = tuple[float, Trial, Made]
 #: Where steps on a mesh begin: factors, and their place in the lane.
 _Begun = tuple[Factorization, int]
 #: How many steps were made, and the index at their ends, if any.
@@ -261,7 +262,8 @@ class MeshLane(Lane):
         if left is not None and np.array_equal(left[0], here.x):
             return left[1]
         factors = here.factors
-        if not (isinstance(factors, Factorization) and np.array_equal(values.at, here.x)):
+        known = isinstance(factors, Factorization) and (self._monodromy is None or np.array_equal(values.at, here.x))
+        if not known:
             given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
             if one_call.correct_on_mesh(self._work, factored, *given) != one_call.CONVERGED:
                 return None
@@ -300,7 +302,8 @@ class MeshLane(Lane):
             for tangent, factors in zip(path.tangents[number - 1 : number + 1], both)
         )
         begin = Trial(self.system, path.x[number - 1].copy(), first)
-        self._handed = step, begin, Trial(self.system, path.x[number].copy(), last, int(iterations), error)
+        end = Trial(self.system, path.x[number].copy(), last, int(iterations), error)
+        self._handed = step, begin, (end, rules.judgement_of(self._attempt, path, number, BELIEVED))
         self._factors = [self.system.unfilled_factors() for _ in range(2)]
         self._rooms = [rooms._replace(factored=factors.room) for rooms, factors in zip(self._rooms, self._factors)]
 
@@ -332,8 +335,8 @@ class Block:
     """Plain steps that one call has made.
 
     - ``made`` (int): How many.
-    - ``handed`` (tuple (float, Trial, Trial) or None): The step behind them, where a kernel has made it and it asks for a
-      closer look: its length, its beginning and its end.
+    - ``handed`` (tuple (float, Trial, (Trial, Judgement)) or None): The step behind them, where a kernel has made it and it
+      asks for a closer look: its length, its beginning, and its end with the judgement.
     """
 
     def __init__(self, system: Any, base: State, path: rules.Path, made: _Made, handed: Handed | None) -> None:

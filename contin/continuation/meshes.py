@@ -16,7 +16,7 @@ from contin.collocation.mesh import MeshControl
 from contin.continuation.points import unsettled
 from contin.continuation.rules import Judgement
 from contin.continuation.scaling import outgrown
-from contin.continuation.steps import Steps
+from contin.continuation.steps import Made, Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.step import State, trial_of
@@ -201,7 +201,7 @@ class MeshPolicy:
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         ), end
 
-    def good_step(self, run: Place, step: float, made: Trial | None) -> tuple[Arc, Judgement]:
+    def good_step(self, run: Place, step: float, made: Made | None) -> tuple[Arc, Judgement]:
         """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
 
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
@@ -223,7 +223,8 @@ class MeshPolicy:
                 other = mesh, run.state.system.carrier(mesh)
             if other is None or not run.go_on(self.moved(run.state, run.here, other)):
                 break
-            again, judged_again = self.steps.attempt(run.state, run.here(), step)
+            near = end.system.carrier(run.state.system)(end.x)
+            again, judged_again = self.steps.attempt(run.state, run.here(), step, near=near)
             better = accuracy_of(again.trial.settled)
             if not better.error < _HELPS * accuracy.error:
                 run.go_on(known)

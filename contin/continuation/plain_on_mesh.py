@@ -108,11 +108,11 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int) -> fl
         step /= 2
         if outcome == ASKS or step < control.shortest:
             return 0.0
+    rules.accept(frame, attempt, control, path, number, step)
     if rules.asks(frame, attempt, control, watch, path, accepted, number, step):
         return -step
     if amplitude.size > 0 and not _product(amplitude, new) > 0:
         return -step
-    rules.accept(frame, attempt, control, path, number, step)
     return -step if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
 
 

@@ -175,7 +175,7 @@ def path_from(state: State, most: int) -> Path:
     return path
 
 
-class _Single(NamedTuple):
+class Single(NamedTuple):
     """One step from a state, by itself."""
 
     frame: Frame
@@ -184,31 +184,46 @@ class _Single(NamedTuple):
     path: Path
 
 
-def _single(state: State, settings: Settings) -> _Single:
+def single_step(state: State, settings: Settings) -> Single:
+    """Return the room of a step from a state."""
     system = state.system
-    return _Single(frame_of(system), attempt_of(system.size), control_of(system, settings), path_from(state, 1))
+    return Single(frame_of(system), attempt_of(system.size), control_of(system, settings), path_from(state, 1))
 
 
 def length_of(state: State, settings: Settings) -> float:
     """Return the length of the step from a state, not far beyond limits."""
-    return length_of_step(_single(state, settings))
+    return length_of_step(single_step(state, settings))
 
 
 def predict(state: State, step: float, settings: Settings = Settings()) -> Array:
     """Return the guess at a distance ``step``: along the tangent, with the curvature known from the last step."""
-    single = _single(state, settings)
+    return predicted(single_step(state, settings), step)
+
+
+def predicted(single: Single, step: float) -> Array:
+    """Return the same of a step whose room is at hand."""
     predict_step(single, step)
     return single.attempt.guess
 
 
 def judged(state: State, guess: Array, trial: Trial, step: float = math.inf, settings: Settings = Settings()) -> Judgement:
     """Return what the step from a state to a corrected point is judged by, with the length of the next one."""
-    single = _single(state, settings)
-    single.path.x[2], single.path.tangents[2] = trial.x, trial.tangent
-    single.attempt.guess[:], single.attempt.judged[ERROR] = guess, trial.newton_error
+    single = single_step(state, settings)
+    single.attempt.guess[:] = guess
+    return judged_as(single, trial, step)
+
+
+def judged_as(single: Single, trial: Trial, step: float) -> Judgement:
+    """Return the same of a step from whose room the guess came."""
+    single.path.x[2], single.path.tangents[2], single.attempt.judged[ERROR] = trial.x, trial.tangent, trial.newton_error
     outcome = judge_step(single, step)
-    missed, turn, length = single.attempt.judged[: LENGTH + 1].tolist()
-    return Judgement(missed, turn, length, float(single.path.numbers[2, NEXT]), outcome)
+    return judgement_of(single.attempt, single.path, 2, outcome)
+
+
+def judgement_of(attempt: Attempt, path: Path, number: int, outcome: int) -> Judgement:
+    """Return what a kernel has judged of the step into a row of a path."""
+    missed, turn, length = attempt.judged[: LENGTH + 1].tolist()
+    return Judgement(missed, turn, length, float(path.numbers[number, NEXT]), outcome)
 
 
 @helper
@@ -392,17 +407,17 @@ def accept(frame: Frame, attempt: Attempt, control: Control, path: Path, number:
 
 
 @kernel(reorder=False)
-def length_of_step(single: _Single) -> float:
+def length_of_step(single: Single) -> float:
     return first_length(single.frame, single.control, single.path, 2)
 
 
 @kernel(reorder=False)
-def predict_step(single: _Single, step: float) -> None:
+def predict_step(single: Single, step: float) -> None:
     fill_guess(single.attempt, single.path, 2, step)
 
 
 @kernel(reorder=False)
-def judge_step(single: _Single, step: float) -> int:
+def judge_step(single: Single, step: float) -> int:
     outcome: int = judge(single.frame, single.attempt, single.control, single.path, 2, step)
     accept(single.frame, single.attempt, single.control, single.path, 2, step)
     return outcome

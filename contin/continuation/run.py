@@ -367,7 +367,7 @@ class Continuation:
     def _step(self, state: State) -> Step | SpecialPoint:
         """Predict and correct, halving the step until the corrected point can be believed; or return the end of the branch."""
         settings, (step, _, made), self._handed = self._steps.settings, self._handed or (0.0, None, None), None
-        if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
+        if made is None or made[0].system is not state.system:  # the mesh may have changed meanwhile
             step, made = length_of(state, settings), None
         finest = max(settings.min_step, ROUGH * step)
         while True:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from contin.continuation.rules import JUMPS, Judgement, aims, judged, predict
+from contin.arrays import Array
+from contin.continuation.rules import JUMPS, Judgement, aims, judged, judged_as, predicted, single_step
 from contin.core.settings import Settings
 from contin.core.small import ASKS, FAILED
 from contin.core.step import State, corrected, settled
@@ -19,6 +20,10 @@ from contin.events.inspection import crossed, jumped
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
+
+
+#: The end of a step that a kernel has made, and what it is judged by.
+Made = tuple[Trial, Judgement]
 
 
 class Step(NamedTuple):
@@ -56,17 +61,16 @@ class Steps:
     primary: str
     fold: Event | None
 
-    def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Arc, Judgement]:
+    def attempt(
+        self, state: State, here: Trial, step: float, made: Made | None = None, near: Array | None = None
+    ) -> tuple[Arc, Judgement]:
         """Make one step of a given length from the state's point, as far as it can be believed by itself.
 
-        ``made`` is its end, where a kernel has it. Raises ConvergenceError where there is none.
+        ``made`` is its end, where a kernel has it; ``near`` is one that is nearer to it than the prediction. Raises
+        ConvergenceError where there is none.
         """
         settings = self.settings
-        guess = predict(state, step, settings)
-        trial = made or corrected(state, guess, step, settings.newton)
-        if state.system.collapsed(state.x, trial.x):
-            raise ConvergenceError("the cycle at the corrected point is an equilibrium")
-        judgement = judged(state, guess, trial, step, settings)
+        trial, judgement = made or self._made(state, step, near)
         if judgement.outcome == FAILED:
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
@@ -80,6 +84,15 @@ class Steps:
             trial = settled(trial, state.tangent, settings.newton)
             trial.settled.system.check_jumps(trial.settled.x, state)
         return Arc(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
+
+    def _made(self, state: State, step: float, near: Array | None) -> Made:
+        """Return the end of a step, and what it is judged by."""
+        single = single_step(state, self.settings)
+        guess = predicted(single, step)
+        trial = corrected(state, guess if near is None else near, step, self.settings.newton)
+        if state.system.collapsed(state.x, trial.x):
+            raise ConvergenceError("the cycle at the corrected point is an equilibrium")
+        return trial, judged_as(single, trial, step)
 
     def accepted(self, arc: Arc, judgement: Judgement, turned: bool) -> State:
         """Return the state behind a step, on the mesh that its end has settled on.
