@@ -87,8 +87,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """
     trial, details, before, last = point.trial, point.details, np.zeros(1), np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
-    if finding_of(details).is_lost:
-        return Refined(trial, errors, details, is_lost=True)
+    if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
+        return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
     try:
         trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
     except ConvergenceError:
