@@ -98,13 +98,13 @@ class BorderedMatrix:
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
-    """Return borders made of null vectors at x: those that random ones give, or rows about the ``kernel``, improved once.
+    """Return borders made of null vectors at x: those that rows about the ``kernel`` give, or random ones, improved once.
 
     Where x is not at a branch point, the second null vector depends on the borders: random ones may be nearly normal to it.
     """
     random = generator("bordered")
     rows, left = kernel, random.standard_normal(system.equations) / np.sqrt(system.equations)
-    for _ in range(2):
+    for _ in range(2 if kernel is None else 1):
         rows = random.standard_normal((2, system.size)) if rows is None else rows
         matrix = BorderedMatrix(system, x, orthonormal(rows, system.weights), left)
         if not np.isfinite(matrix.kernel).all():
@@ -199,7 +199,7 @@ class BranchPoint(Finding):
         """
         random, noise = generator("branch point"), np.zeros_like(self.x)
         with np.errstate(all="ignore"):
-            search = _Search(system, self.x, newton, self.kernel)
+            search = _Search(system, self.x, newton, (self.kernel, self.left), self.hessian)
             for _ in range(draws.DRAWS):
                 search.x = before = draws.rounded(random, search.x)
                 if not search.advance():
@@ -281,7 +281,7 @@ def locate_branch_point(
     (True, 2)
     """
     with np.errstate(all="ignore"):
-        search = _Search(system, np.array(x, dtype=float), newton, kernel)
+        search = _Search(system, np.array(x, dtype=float), newton, borders_at(system, x, kernel))
         for _ in range(max_iterations - 1):  # the first linearization made the borders
             if not search.advance():
                 break
@@ -292,16 +292,17 @@ def locate_branch_point(
 
 
 class _Search:
-    """The iteration of `locate_branch_point`: x, beta, and the Hessian with what is known of its change."""
+    """The iteration of `locate_branch_point`: x, beta, and the Hessian, if known, with what is known of its change."""
 
-    def __init__(self, system: Discretization, x: Array, newton: Newton, kernel: Array | None) -> None:
+    def __init__(
+        self, system: Discretization, x: Array, newton: Newton, borders: tuple[Array, Array], hessian: Array | None = None
+    ) -> None:
         self.system, self.x, self.newton = system, x, newton
         self.beta = 0.0
         self.size, self.before = np.inf, np.inf  # of the last update, and of the one before
         self._rate_before = 1.0
-        self._borders = borders_at(system, x, kernel)
-        self._hessian: Array | None = None
-        self._slope: Array = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
+        self._borders, self._hessian = borders, hessian
+        self._slope: Any = hessian  # the Hessian, corrected by how the gradient has really changed
         self._drop: Array = np.zeros(2)  # the last update along the kernel
         self._gradient: Array = np.zeros(2)  # g before it
 
