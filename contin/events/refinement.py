@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from contin.core.labels import Label
 from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.settings import Settings
-from contin.core.step import ROUNDS, located, standing_at
+from contin.core.step import ROUNDS, corrected, located, standing_at
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint, Value, find_zero
@@ -71,8 +71,17 @@ class Refined:
     is_lost: bool = False
 
 
-#: A special point on another mesh: the point, its details, and how far from it along the branch its place may be.
-_Found = tuple[Trial, Any, float]
+class _Found(NamedTuple):
+    """A special point on a mesh.
+
+    ``left`` is how far its place may be off along the branch or, after `_on_switches`, by how much its free parameters may be,
+    ``slope`` the derivative of its test function along the branch; NaN where it is not known.
+    """
+
+    trial: Trial
+    details: Any
+    left: Any = 0.0
+    slope: float = np.nan
 
 
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
@@ -90,17 +99,17 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
         return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
     try:
-        trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
+        now = _on_switches(point, _Found(trial, details), settings.newton)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
-    is_lost = False
+    (trial, details, *_), is_lost = now, False
     for number in range(_HALVINGS):
         coarse = trial.system
-        made = None if number else _on_made_mesh(point, trial, details, settings)
+        made = None if number else _on_made_mesh(point, now, settings)
         finer = None if made else coarse.refined()
         try:
-            again = made or _again(point, trial, details, finer or (coarse, np.array), settings.newton)
-            better, found, left = _on_switches(point, again, settings.newton)
+            again = made or _again(point, now, finer or (coarse, np.array), settings.newton)
+            better, found, left, _ = now = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
             break
@@ -127,14 +136,15 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
 
 
-def _on_made_mesh(point: SpecialPoint, trial: Trial, details: object, settings: Settings) -> _Found | None:
+def _on_made_mesh(point: SpecialPoint, coarse: _Found, settings: Settings) -> _Found | None:
     """Return a special point on a mesh that is made for the tolerance, of twice as many intervals at least; None if not found.
 
     Interpolation moves a point along the branch: there is none for those whose place no equation holds, and where the halved
     mesh serves as well.
     """
-    test, control, system = point.test, settings.mesh, trial.system
-    if test is None or finding_of(details).has_equations or not (system.intervals and np.isfinite(trial.tangent).all()):
+    test, control, trial = point.test, settings.mesh, coarse.trial
+    system = trial.system
+    if test is None or finding_of(coarse.details).has_equations or not (system.intervals and np.isfinite(trial.tangent).all()):
         return None
     if not (test.holds_one_of(system.free) or trial.value(test)) or not trial.discretization_error > control.tolerance:
         return None
@@ -142,8 +152,8 @@ def _on_made_mesh(point: SpecialPoint, trial: Trial, details: object, settings: 
     if made is None or made[0].intervals < 2 * system.intervals:
         return None
     with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
-        there = _again(point, trial, details, made, settings.newton)
-        x = there[0].x[made[0].state_size :]
+        there = _again(point, coarse, made, settings.newton)
+        x = there.trial.x[made[0].state_size :]
         return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else None
     return None
 
@@ -186,39 +196,39 @@ def _change(test: Event, trial: Trial, move: Array) -> float:
     return (ends[0] - ends[1]) / (2 * ASIDE)
 
 
-def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Trial, Any, Any]:
+def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> _Found:
     """Return a special point on a mesh with points where conditions that the solution decides switch.
 
-    Returned last is how far its free parameters may be from their values: by how much they changed when mesh points were moved
-    there the last time, and what they change along the branch over the distance that its place is known to. Raises
-    ConvergenceError where it was not found on such a mesh, or the places do not settle.
+    Its free parameters may be off by how much they changed when mesh points were moved there the last time, and what they
+    change along the branch over the distance that its place is known to. Raises ConvergenceError where it was not found on such
+    a mesh, or the places do not settle.
     """
-    trial, details, apart = found
     moves: Any = 0.0
     for _ in range(ROUNDS):
-        moved = trial.system.on_switches(trial.x, closely=True)
+        system = found.trial.system
+        moved = system.on_switches(found.trial.x, closely=True)
         if moved is None:
             break
-        before = trial.x[trial.system.state_size :]
-        trial, details, apart = _again(point, trial, details, moved, newton)
-        moves = np.abs(trial.x[trial.system.state_size :] - before)
-    if apart:
-        moves = moves + apart * np.abs(trial.tangent[trial.system.state_size :])
-    return trial, details, moves
+        before = found.trial.x[system.state_size :]
+        found = _again(point, found, moved, newton)
+        moves = np.abs(found.trial.x[system.state_size :] - before)
+    if found.left:
+        moves = moves + found.left * np.abs(found.trial.tangent[found.trial.system.state_size :])
+    return found._replace(left=moves)
 
 
-def _again(point: SpecialPoint, trial: Trial, details: object, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
+def _again(point: SpecialPoint, coarse: _Found, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
     """Return the special point and its details on another mesh.
 
     Raises ConvergenceError where it was not found, or another one was.
     """
-    system, carry = finer
+    (system, carry), (trial, details, _, slope) = finer, coarse
     known = _NEAREST if details is None and point.label == Label.BRANCH_POINT and point.test is None else finding_of(details)
     if known.has_equations:
         found = known.again(system, carry, trial.x, newton)
-        return found.there(system, carry(trial.tangent)), found, 0.0
-    found, apart = zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton)
-    return found, details, apart
+        return _Found(found.there(system, carry(trial.tangent)), found)
+    zero, apart, slope = zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton, slope)
+    return _Found(zero, details, apart, slope)
 
 
 class _Nearest(Finding):
@@ -235,11 +245,14 @@ class _Nearest(Finding):
 _NEAREST = _Nearest()
 
 
-def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
+def zero_again(
+    system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton, slope: float = np.nan
+) -> tuple[Trial, float, float]:
     """Return the zero of a test function near x, by secants along the tangent; without one, x corrected.
 
-    Where the function is the value of a free parameter, that is held. Returned last is how far off the zero may lie. Raises
-    ConvergenceError where Newton's method fails, or there is no zero.
+    Where the function is the value of a free parameter, that is held. Returned, too, are how far off the zero may lie, and the
+    slope of the function there, as far as it is known; ``slope`` is about that. Raises ConvergenceError where Newton's method
+    fails, or there is no zero.
     """
     distance, holds = 0.0, test is not None and test.holds_one_of(system.free)
     if holds:
@@ -247,23 +260,28 @@ def zero_again(system: Discretization, x: Array, tangent: Array, test: Event | N
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
     factors: Factors | None = None
 
-    def at(s: float) -> Trial:
-        trial = located(state, x + s * state.tangent, s, newton, factors)
+    def at(s: float, near: tuple[float, Trial] | None = None) -> Trial:
+        if near is not None and abs(s - near[0]) < LOCATED:  # the tangent leads there, up to the square
+            place, trial = near
+            shifted = trial.x + (s - place) * trial.tangent
+            return Trial(trial.system, shifted, trial.linear, trial.iterations, trial.newton_error)
+        guess = x + s * state.tangent
+        trial = corrected(state, guess, s, newton) if factors is None else located(state, guess, s, newton, factors)
         for _ in range(ROUNDS):
             moved = trial.system.on_switches(trial.x, closely=True)
             if moved is None:
                 break
             carry = system.carrier(moved[0])
             base, along = carry(x), carry(state.tangent)
-            there = standing_at(moved[0], base, along / np.sqrt(inner(moved[0], along, along)), 1.0)
-            trial = located(there, moved[1](trial.x), s, newton)
+            moving = standing_at(moved[0], base, along / np.sqrt(inner(moved[0], along, along)), 1.0)
+            trial = located(moving, moved[1](trial.x), s, newton)
         return trial
 
     here = at(distance)
     if test is None or holds:
-        return here, 0.0
+        return here, 0.0, np.nan
     factors = here.factors if here.system is system else None
-    return _by_secants(at, here, test)
+    return _by_secants(at, here, test, slope)
 
 
 def _towards(system: Discretization, x: Array, tangent: Array, test: Any) -> tuple[Array, float]:
@@ -276,40 +294,55 @@ def _towards(system: Discretization, x: Array, tangent: Array, test: Any) -> tup
     return along, float(gap * length)
 
 
-def _by_secants(at: Callable[[float], Trial], here: Trial, test: Event) -> tuple[Trial, float]:
-    """Return the zero of a test function near ``here``, which is ``at(0)``, and how far off it may lie.
+def _by_secants(at: Callable[..., Trial], here: Trial, test: Event, slope: float = np.nan) -> tuple[Trial, float, float]:
+    """Return the zero of a test function near ``here``, which is ``at(0)``, how far off it may lie, and the slope there.
 
-    Each secant goes through the place nearest to zero and the one looked at last. Where some in a row come no nearer, values
-    are round-off, and the slope of the first secant says how far that reaches; where it does not, it is looked for. Raises
-    ConvergenceError where Newton's method fails, or there is no zero.
+    The first secant leads to where the zero is by a ``slope`` that is known about, if the value there is much smaller, or over
+    the distance `ROUGH`. Each of the next goes through the place nearest to zero and the one looked at last. Where some in a
+    row come no nearer, values are round-off, and the slope of the first secant says how far that reaches; where it does not, it
+    is looked for. Raises ConvergenceError where Newton's method fails, or there is no zero.
     """
+
+    def place(s: float) -> tuple[float, float, Trial]:
+        trial = at(s)
+        return s, test.function(trial), trial
+
     value = test.function(here)
     if value == 0:
-        return here, 0.0
-    beside = at(ROUGH)
-    best, other = (0.0, value, here), (ROUGH, test.function(beside), beside)
-    if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:
-        return here, _stands_still_to(lambda s: test.function(at(s)))  # its value there is that of the fold
-    if abs(value) > _FAR_OFF * abs(other[1]) and (near := _bracketed(lambda s: test.function(at(s)), best[:2], other[:2])):
-        best = near, test.function(at(near)), at(near)
-    slope, blurred = abs(other[1] - value) / ROUGH, [0.0]
+        return here, 0.0, slope
+    best, s = (0.0, value, here), -value / slope
+    if abs(s) < CORRECTED:
+        return at(s, (0.0, here)), abs(s), slope
+    near = other = place(s) if abs(s) < _FAR_OFF * ROUGH else best
+    if not abs(near[1]) <= _NEARER * abs(value):
+        other = place(ROUGH)
+        if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:
+            return here, _stands_still_to(lambda s: test.function(at(s))), np.nan  # its value there is that of the fold
+        slope = (other[1] - value) / ROUGH
+        if near is not best and (noise := max(abs(value), abs(near[1]))) < LOCATED * abs(slope):
+            s, value, trial = min(best, near, key=lambda place: abs(place[1]))
+            return at(s - value / slope, (s, trial)), noise / abs(slope), slope
+        inside = abs(value) > _FAR_OFF * abs(other[1]) and _bracketed(lambda s: test.function(at(s)), best[:2], other[:2])
+        best = place(inside) if inside else best
+    first, blurred = abs(slope), [0.0]
     for _ in range(MOST_UPDATES):
         best, other = sorted((best, other), key=lambda place: abs(place[1]))
         if best[1] == 0:
-            return best[2], 0.0
+            return best[2], 0.0, slope
         if len(blurred) > _BLURRED or best[1] == other[1]:
             break  # the function is round-off, or does not depend on the place and is not zero
+        if abs(best[0] - other[0]) > LOCATED:  # nearer by, slopes are round-off
+            slope = (best[1] - other[1]) / (best[0] - other[0])
         s = best[0] - best[1] * (best[0] - other[0]) / (best[1] - other[1])
         if not abs(s) <= _AWAY:
             break  # such a zero is another one, or the function is round-off
         if len(blurred) == 1 and abs(s - best[0]) * abs(s - other[0]) < LAST_PLACES:
-            return at(s), abs(s - best[0])
-        trial = at(s)
-        other = s, test.function(trial), trial
+            return at(s, (best[0], best[2])), abs(s - best[0]), slope
+        other = place(s)
         blurred = [*blurred, abs(other[1])] if abs(other[1]) > _NEARER * abs(best[1]) else [0.0]
-    if len(blurred) > _BLURRED and max(blurred) < slope * ROUGH:
-        return best[2], max(blurred) / slope
-    return here, _known_to(lambda s: test.function(at(s)))
+    if len(blurred) > _BLURRED and max(blurred) < first * ROUGH:
+        return best[2], max(blurred) / first, np.nan
+    return here, _known_to(lambda s: test.function(at(s))), np.nan
 
 
 def _bracketed(function: Callable[[float], float], here: Value, beside: Value) -> float | None:

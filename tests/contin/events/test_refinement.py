@@ -29,8 +29,17 @@ def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
 def test_a_zero_of_a_function_that_bends_at_once_is_no_round_off(zero):
     """The function is 1 at the first distance of the secants: 0 was returned for the first zero, and nothing for the second."""
     test = SimpleNamespace(function=lambda s: math.tanh(1e5 * (s - zero)), label="PD")
-    place, apart = refinement._by_secants(lambda s: s, 0.0, test)
+    place, apart, _ = refinement._by_secants(lambda s, near=None: s, 0.0, test)
     assert abs(place - zero) < 1e-13 and apart < 1e-9
+
+
+@pytest.mark.parametrize(("slope", "looks"), [(2.0, 2), (-2.0, 4), (2e3, 4), (2e-3, 3), (math.nan, 3)])
+def test_a_slope_from_another_mesh_is_believed_where_it_leads_to_zero(slope, looks):
+    """Otherwise the function is looked at further off."""
+    seen = []
+    test = SimpleNamespace(function=lambda s: seen.append(s) or 2 * (s - 1e-8), label="PD")
+    place, _, known = refinement._by_secants(lambda s, near=None: s, 0.0, test, slope)
+    assert place == pytest.approx(1e-8, abs=1e-15) and known == pytest.approx(2) and len(seen) == looks
 
 
 def foundation(t, u, p):
@@ -61,8 +70,8 @@ def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
     settings = Settings(limits={"lam": (0, 4), "mean": (-1, 1)})
     coarse = trace(start, settings, free=["lam"], errors=False)
 
-    def elsewhere(system, x, tangent, test, newton):
-        return Trial(system, x + 0.5, Linearization(tangent, 1.0)), 0.0
+    def elsewhere(system, x, tangent, test, newton, slope):
+        return Trial(system, x + 0.5, Linearization(tangent, 1.0)), 0.0, slope
 
     monkeypatch.setattr(refinement, "zero_again", elsewhere)
     branch = trace(start, settings, free=["lam"])
@@ -83,7 +92,7 @@ def test_a_point_for_which_newton_fails_on_finer_meshes_keeps_its_label(monkeypa
     """Nothing is known against it: its errors are NaN, and a note says so."""
     start = solve(bratu(), [0, 0], degree=6)
 
-    def fails(system, x, tangent, test, newton):
+    def fails(system, x, tangent, test, newton, slope):
         raise ConvergenceError("Newton did not converge")
 
     monkeypatch.setattr(refinement, "zero_again", fails)
