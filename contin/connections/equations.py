@@ -408,17 +408,16 @@ class ConnectionCollocation(Collocation):
         B the second derivatives. Each condition is changed by that, and by an estimate of the next term, which is not known:
         the third power of the distance, over the square of the orbit's size.
         """
-        from scipy.linalg import null_space, solve_sylvester  # type: ignore[import-untyped]  # .1 s; only this needs it
-
         p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
         amounts: list[float] = []
         for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
             if not len(L):
                 continue
-            A, L, N = self._linear_at_ends(p)[end].jacobian, _normalized(L, self._bases[end]), null_space(L)
+            A, L = self._linear_at_ends(p)[end].jacobian, _normalized(L, self._bases[end])
+            N = np.linalg.svd(L)[2][len(L) :].T
             K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
             bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
-            H = solve_sylvester(-M, np.kron(K, unit) + np.kron(unit, K), bent)
+            H = _sylvester(-M, np.kron(K, unit) + np.kron(unit, K))(bent)
             z = N.T @ apart
             amounts += [*(np.abs(H @ np.kron(z, z)) + float(np.linalg.norm(apart)) ** 3 / size**2)]
         right_sides = np.zeros((len(amounts), self.equations + 1))

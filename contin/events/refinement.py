@@ -133,7 +133,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if np.all(settled) or moved > _CLOSER * last:
             break
         before, last = steps, moved
-    return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
+    return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings), details, is_lost)
 
 
 def _on_made_mesh(point: SpecialPoint, coarse: _Found, settings: Settings) -> _Found | None:
@@ -167,7 +167,9 @@ def _part_left(coarse: Trial, better: Trial) -> float:
     return min(_SAFE * max(order, better.discretization_error / coarse.discretization_error), 1.0)
 
 
-def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, settings: Settings) -> dict[str, float]:
+def _with_cut_off(
+    errors: dict[str, float], trial: Trial, test: Event | None, slope: float, settings: Settings
+) -> dict[str, float]:
     """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
 
     A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
@@ -181,19 +183,17 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, se
         primary = settings.primary or system.free[0]
         test = Event(Label.END, "start", lambda trial: trial[primary])
     if test.label != Label.FOLD:
-        size = float(np.abs(along).max())
-        slope = _change(test, trial, along * (ASIDE / size)) * size
+        slope = _change(test, trial, along) if np.isnan(slope) else slope
         for move in moves:
-            largest = float(np.abs(move).max())
-            move -= along * (_change(test, trial, move * (ASIDE / largest)) * largest / slope if largest and slope else 0.0)
+            move -= along * (_change(test, trial, move) / slope if move.any() and slope else 0.0)
     added = np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
     return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
 
 
 def _change(test: Event, trial: Trial, move: Array) -> float:
-    """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
-    ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
-    return (ends[0] - ends[1]) / (2 * ASIDE)
+    """Return by how much a test function changes along a move, by its difference over a distance that suits."""
+    part = ASIDE / float(np.abs(move).max())
+    return (test.function(Trial.without_tangent(trial.system, trial.x + part * move)) - test.function(trial)) / part
 
 
 def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> _Found:
