@@ -45,6 +45,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, cast
@@ -119,13 +120,21 @@ class FoldCurve(Defining):
         return float(products[0]), float(products[-1])
 
     def own_values(self, x: Array) -> Array:
-        """Return g."""
-        return self.at(x)[0].g[0]
+        """Return g, with the sign of the determinant of F_z.
+
+        An iterate of Newton's method far away may leave borders with which the determinant of the bordered matrix has the other
+        sign here: that of g itself depends on them.
+        """
+        return self._sign(x) * self.at(x)[0].g[0]
 
     def own_gradients(self, x: Array) -> Array:
-        """Return dg/dx."""
+        """Return its derivatives by x."""
         v, w = self.null_vectors(x)
-        return -self.base.bent(x, w, v)[None]
+        return -self._sign(x) * self.base.bent(x, w, v)[None]
+
+    def _sign(self, x: Array) -> float:
+        """Return the sign of the determinant of the bordered matrix; 1 where its factors do not say it."""
+        return math.copysign(1.0, self.at(x)[0].factors.sign)
 
     @property
     def stationary(self) -> str:

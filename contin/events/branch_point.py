@@ -325,8 +325,8 @@ class _Search:
             return False  # a gradient that does not change along the kernel: no branch point here
         update = correction[:-1] + self._drop @ matrix.kernel
         self.beta -= correction[-1]
+        self.size = float(np.max(np.abs(update) / (1 + np.abs(self.x))))  # the x before: a huge update makes a huge x
         self.x = self.x - update
-        self.size = float(np.max(np.abs(update) / (1 + np.abs(self.x))))
         return bool(np.isfinite(self.size) and self.size <= _GONE)
 
     def forget(self) -> None:

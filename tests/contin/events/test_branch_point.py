@@ -66,6 +66,17 @@ def test_no_branch_point_on_a_regular_curve(system):
         locate_branch_point(system, np.full(system.size, 0.1))
 
 
+def test_first_huge_update_ends_the_search():
+    """Where the gradient hardly changes along the kernel Newton's method leaps; each further step would be computed in vain."""
+    problem = AlgebraicProblem(lambda u, p: (u.x + 1e-7 * (u.x * p.a) ** 2 + p.a,), ["x"], {"a": 0.3})
+    system, places = Algebraic(problem, ["a"]), []
+    linearize = system.linearize
+    system.linearize = lambda x, *more: places.append(x) or linearize(x, *more)
+    with pytest.raises(ConvergenceError, match="no branch point"):
+        locate_branch_point(system, np.array([-0.3, 0.3]))
+    assert np.abs(places).max() < 10
+
+
 def test_large_steps_pass_no_branch_point_silently():
     """Many buckling loads inside one step of 100: the count of singular values cuts the step down."""
     start = solve(elastica(), [0, 0], intervals=12, degree=6)

@@ -75,6 +75,22 @@ def test_borders_stay_with_another_reference():
     assert other is not folds and other.borders is folds.borders
 
 
+@pytest.mark.parametrize("which", [0, 1])
+def test_sign_does_not_depend_on_borders(which):
+    """Newton's method, where it goes astray, leaves borders of the other sense: the run would see a branch point."""
+    point = cusp().points[2]
+    x, tangent = point.x, point.tangent
+    folds = FoldCurve(point.system.base)
+    signs, gradients = [], []
+    for _ in range(2):
+        signs.append(folds.linearize(x, (tangent,))[1].sign)
+        gradients.append(folds.own_gradients(x))
+        folds.borders = tuple(-border if number == which else border for number, border in enumerate(folds.borders))
+        folds._known.clear()
+    assert signs[0] == signs[1] != 0
+    assert gradients[1] == pytest.approx(gradients[0], rel=1e-12)
+
+
 def test_linear_functions_do_not_bend():
     """Boundary conditions u(0) = u(1) = 0 have no second derivatives; the field has."""
     system = extrema().points[0].system.base
