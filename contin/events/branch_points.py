@@ -63,15 +63,16 @@ class BranchPointSearch:
         row, size = state.row, state.system.size
         same = same_sign(before.sign, trial.sign)
         kept = before.factors is not None  # bordered by a row of the step before
-        if same and kept and calm(before.factors, trial.factors, size):
+        watched = kept and is_watched(before.factors, trial.factors, size)
+        if same and kept and not watched and calm(before.factors, trial.factors, size):
             return 0, True
         if same and state.system.cannot_branch(self.arc):
             return 0, True
         if not kept:
             before.refactor(row)
-            if same and calm(before.factors, trial.factors, size):
-                return 0, True
-        watched = is_watched(before.factors, trial.factors, size)
+            watched = is_watched(before.factors, trial.factors, size)
+        if same and (watched or not kept) and calm(before.factors, trial.factors, size):  # takes long where watched
+            return 0, True
         if watched and not self._sign_changes:
             along = quotients_along(
                 functools.cache(lambda part: trial.factors if part == 1 else self._bordered(part, row[None]))
