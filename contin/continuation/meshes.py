@@ -189,7 +189,7 @@ class MeshPolicy:
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
         before = here()
-        if system.collapsed(x, done.x) or self.steps.sense(before) * self.steps.sense(end) < 0:
+        if system.collapsed(x, done.x) or self.steps.reverses(before, end):
             return None
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
             return None  # the next point will do as well

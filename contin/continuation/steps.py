@@ -117,6 +117,11 @@ class Steps:
         """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
         return 0.0 if self.fold is None else sense(trial, self.fold, self.settings.newton)
 
+    def reverses(self, one: Trial, other: Trial) -> bool:
+        """Return whether the primary parameter goes in opposite senses at two points, as far as these can be told."""
+        fold = self.fold
+        return fold is not None and one.value(fold) * other.value(fold) < 0 and self.sense(one) * self.sense(other) < 0
+
     def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
         """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""
         name, newton = self.settings.trivial, self.settings.newton
