@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below
+    interrupt.begin("no page was written")
+
 import shlex
 import sys
 from pathlib import Path
 
-from branches.store import interrupt
 from branches.store.command import Parser, answered, typed, write_output
 
 
@@ -55,5 +59,4 @@ def main(argv=None) -> int:
 
 
 if __name__ == "__main__":
-    interrupt.begin("no page was written")
     sys.exit(interrupt.run(main))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from branches.store import interrupt
+
+if __name__ == "__main__":  # before the imports below
+    interrupt.begin()
+
 import contextlib
 import os
 import sys
 
-from branches.store import interrupt
 from branches.store.command import Parser, answered, complain, write_output
 
 # Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
@@ -214,5 +218,4 @@ def output_path(options):
 
 
 if __name__ == "__main__":
-    interrupt.begin()
     sys.exit(interrupt.run(main))
