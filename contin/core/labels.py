@@ -55,5 +55,3 @@ class Label(enum.StrEnum):
 SINGULAR = frozenset((Label.FOLD, Label.BRANCH_POINT, Label.CUSP))
 #: Those of points that are in doubt where they are not found again on a finer mesh; others keep theirs with ± NaN.
 CONFIRMED = frozenset((Label.FOLD, Label.BRANCH_POINT, Label.HOPF, Label.PERIOD_DOUBLING, Label.TORUS))
-#: Those of points that no derivative by the solution tells.
-BY_VALUES = frozenset((Label.END, Label.USER_ZERO, Label.FAILED))
