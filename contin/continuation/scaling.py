@@ -104,15 +104,11 @@ def scaled(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Mode:
-    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order.
-
-    It is ``pure`` if no more than a part `APART` of any state is left in it of other eigenvectors.
-    """
+    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order."""
 
     vector: Array
     rate: float
     order: int
-    pure: bool
 
     @property
     def distance(self) -> float:
@@ -342,8 +338,7 @@ class _FirstPoint:
         errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
         found = self._kept(mode, self.system.largest(mode) > errors)
         alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
-        pure = bool(np.all(self.system.largest(missed) <= APART * self.system.largest(mode)))
-        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order, pure)
+        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order)
 
     def _parted(self, v: Array, direction: Array, order: int) -> tuple[Array, float] | None:
         """Return the eigenvector of the largest eigenvalue in the Krylov space of v, and that; None where it is complex."""
@@ -371,8 +366,6 @@ class _FirstPoint:
 
         They belong to what the power method has left of other eigenvectors, where symmetry makes them zero.
         """
-        if mode.pure:
-            return self._branch(mode)
         again = mode.vector
         for _ in range(2):  # the sign is that of the first again
             again = self._changed(again, self.tangent, mode.order) / mode.rate

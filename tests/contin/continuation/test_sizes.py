@@ -354,6 +354,19 @@ def test_states_of_modes_that_are_close(seed):
     assert np.all(branch[0].system.scales.states < 1e-7)
 
 
+@pytest.mark.parametrize("load", [8.0, 8.5, 9.0, 9.5])
+def test_what_other_modes_leave_is_no_size(load, monkeypatch):
+    """The force across a column is zero by symmetry, but for 1e-13 of other modes: its size was 6e-11, P = pi^2 lost."""
+    column = contin.VariationalProblem(
+        energy=lambda t, x, w, p: w.angle**2 / 2 + p.P * math.cos(x.angle), states=["y", "angle"], parameters={"P": load},
+        kinematics=lambda t, x, w, p: (math.sin(x.angle), w.angle), controls=["angle"], ends=lambda a, b, p: (a.y, b.y),
+    )  # fmt: skip
+    monkeypatch.setattr(scaling._FirstPoint, "usual", lambda *_: False)  # which some draws do not see
+    branch = trace(solve(column, [0, 0]), free=["P"], limits={"P": (load, 12)})
+    assert branch[0].system.scales.are_one
+    assert [point["P"] for point in branch.labelled("BP")] == pytest.approx([math.pi**2], rel=1e-12)
+
+
 @pytest.mark.parametrize("height", [0.02, 0.05])
 def test_a_branch_that_begins_where_the_load_has_grown(height):
     """The trivial branch begins at a load of .008, and branches turn off at 8: steps are as long as the new load allows."""
