@@ -379,7 +379,7 @@ def _fill_field(codes: Codes, values: Values, times: Array, states: Array, found
 
 
 @kernel
-def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> float:
+def estimate(work: Workspace, factored: Factored, room: Estimate, x: ReadOnlyVector) -> float:
     """Return `Defect.error` at x, for factors right there."""
     codes, mesh, values = work
     n, h = room.points.shape[1], mesh.h
