@@ -672,6 +672,11 @@ class Collocation(Composed):
         none, field = np.zeros((self._n, len(self.parameters))), self._field.load()
         return projections(field, field, (0, 0), (none, none), self._free)
 
+    def holds(self, x: Array, tolerance: float) -> bool:
+        """Return whether a solution with another reference is one with this one: it meets the linear conditions."""
+        known = self.linear_conditions
+        return known is not None and bool(np.abs(known[0] @ x - known[1]).max(initial=0.0) <= tolerance)
+
     def fill_conditions(self, values: Values) -> int:
         """Fill in what a kernel must know of the conditions beyond those of the problem; return how many there are."""
         known = self.linear_conditions

@@ -20,7 +20,7 @@ from contin.continuation.steps import Made, Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.step import State, trial_of
-from contin.core.trial import Event, Trial
+from contin.core.trial import Event, Trial, linearization
 from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc
@@ -183,6 +183,11 @@ class MeshPolicy:
         if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
             return dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step), None
         try:
+            if carry is np.array and system.holds(x, newton.tolerance):  # the mesh stays: x is the same point, not only near it
+                end = Trial(system, x, linearization(system, x, row))
+                return dataclasses.replace(
+                    state, system=system, x=x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
+                ), end
             done = correct(system, x, row, row @ x, newton, linearize=True)
             end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
             system.check_jumps(end.x, state, False)

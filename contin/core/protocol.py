@@ -147,6 +147,10 @@ class Discretization(Equations, Protocol):
     def refined(self) -> tuple[Discretization, Carrier] | None:
         """Return the same on every interval halved, and the carrier; None without a mesh."""
 
+    def holds(self, x: Array, tolerance: float) -> bool:
+        """Return whether a solution with another reference is one with this one; False where that is not known."""
+        return False
+
     @abstractmethod
     def adapted(self, x: Array, control: MeshControl) -> tuple[Discretization, Carrier] | None:
         """Return the same on a better mesh for x, and the carrier; None where there is no need."""

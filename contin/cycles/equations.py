@@ -559,7 +559,8 @@ class CycleCollocation(PeriodicCollocation):
         """The row that takes the states in x to `amplitude`, shape (state_size,)."""
         if self._amplitude is None:
             weights, varying = self._varying
-            row = weights[:, None] * (varying - (weights @ varying) @ self._mean_turn) / self.reference_size
+            size = np.sqrt(weights @ np.einsum("ka,ka->k", varying, varying))
+            row = weights[:, None] * (varying - (weights @ varying) @ self._mean_turn) / size
             self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 

@@ -113,6 +113,7 @@ def test_nothing_that_was_computed_on_a_mesh_is_kept_on_another():
     x, values = carry(used.x), dict(zip(moved.problem.parameters, moved.parameters))
     x.setflags(write=False)
     other = moved.with_reference(x)
+    assert other.holds(x, 1e-12) and not other.holds(other.moved(x, 0.1), 1e-3)
     made = type(other)(other.problem, mesh, other.degree, other.free, values, other.scales).with_reference(x)
     row = (made.weights * x,)
     (residual, factors), (expected, there) = (system.linearize(x, row) for system in (other, made))
