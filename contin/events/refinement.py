@@ -117,7 +117,11 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
         least = LAST_PLACES * size.max()
-        steps = np.maximum(steps * _part_left(trial, better) if made else steps, least)
+        if made:
+            steps = steps * _part_left(trial, better)
+            if point.test is not None and point.test.holds_one_of(system.free) and not system.on_curve:
+                steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
+        steps = np.maximum(steps, least)
         left = left + finding_of(found).round_off(system, settings.newton)
         moved = float(np.max(steps / size))
         if np.any(steps > _FAR * size):
