@@ -22,7 +22,7 @@ from contin.core.small import corrected_small
 from contin.core.step import Reason, State, Stop, located, settled
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
-from contin.levels import CORRECTED, MOST_HALVINGS, ROUGH
+from contin.levels import CORRECTED, LOCATED, MOST_HALVINGS, ROUGH
 from contin.text import shown
 
 #: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
@@ -177,6 +177,7 @@ class SpecialPoint:
       found.
     - ``is_lost`` (bool): It was looked for on a finer mesh, and is not there.
     - ``is_located`` (bool): It was found, and not only bracketed.
+    - ``slope`` (float): Derivative of the test function along the branch, roughly; NaN where it is not known.
     - ``coarse`` (SpecialPoint, optional): As the step has found it, where a normal form may belong to it.
     """
 
@@ -191,6 +192,7 @@ class SpecialPoint:
     errors: Mapping[str, float] | None = None
     is_lost: bool = False
     is_located: bool = True
+    slope: float = math.nan
     coarse: SpecialPoint | None = None
 
     __repr__ = shown
@@ -311,7 +313,13 @@ class Arc:
     def locate(self, test: Event, left: Place, right: Place, guess: float | None = None) -> SpecialPoint:
         """Return the zero of a test function between two places; where location fails, the second one, which is not located."""
         (a, first), (b, last) = left, right
-        ends, is_located = (first.value(test), last.value(test)), True
+        ends, is_located, slope = (first.value(test), last.value(test)), True, math.nan
+        looks = [(a, ends[0]), (b, ends[1])]
+
+        def look(s: float) -> float:
+            looks.append((s, test.function(self.at(s))))
+            return looks[-1][1]
+
         try:
             if test.holds_one_of(first.system.free) and ends[0] * ends[1] < 0:
                 held = self._held(test, left, right)
@@ -320,12 +328,15 @@ class Arc:
             if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
-                at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), self.precision, guess)
+                at = find_zero(look, looks[0], looks[1], self.precision, guess)
                 there = self.at(at)
+                s, value = min((place for place in looks if abs(place[0] - at) > LOCATED), key=lambda place: abs(place[0] - at))
+                slope = (value - test.function(there)) / (s - at) * inner(self.state.system, self.state.tangent, there.tangent)
         except ConvergenceError:
             at, there, is_located = b, last, False
         details = None if test.describe is None else test.describe(there)
-        return SpecialPoint(at, test.label, test.name, there, stop_of(test), details, test, is_located=is_located)
+        given: Any = {"is_located": is_located, "slope": slope}
+        return SpecialPoint(at, test.label, test.name, there, stop_of(test), details, test, **given)
 
     def _held(self, test: Event, left: Place, right: Place) -> Place | None:
         """Return the place between two where a free parameter has a value, with that held; None if it is not found.

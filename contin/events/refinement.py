@@ -99,7 +99,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
         return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
     try:
-        now = _on_switches(point, _Found(trial, details), settings.newton)
+        now = _on_switches(point, _Found(trial, details, slope=point.slope), settings.newton)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
     (trial, details, *_), is_lost = now, False
@@ -317,7 +317,7 @@ def _by_secants(at: Callable[..., Trial], here: Trial, test: Event, slope: float
     best, s = (0.0, value, here), -value / slope
     if abs(s) < CORRECTED:
         return at(s, (0.0, here)), abs(s), slope
-    near = other = place(s) if abs(s) < _FAR_OFF * ROUGH else best
+    near = other = place(s) if abs(s) < ROUGH else best
     if not abs(near[1]) <= _NEARER * abs(value):
         other = place(ROUGH)
         if test.label == Label.FOLD and max(abs(value), abs(other[1])) < CORRECTED:

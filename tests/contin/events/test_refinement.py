@@ -33,13 +33,27 @@ def test_a_zero_of_a_function_that_bends_at_once_is_no_round_off(zero):
     assert abs(place - zero) < 1e-13 and apart < 1e-9
 
 
-@pytest.mark.parametrize(("slope", "looks"), [(2.0, 2), (-2.0, 4), (2e3, 4), (2e-3, 3), (math.nan, 3)])
+@pytest.mark.parametrize(("slope", "looks"), [(2.0, 2), (-2.0, 4), (2e3, 4), (2e-3, 4), (math.nan, 3)])
 def test_a_slope_from_another_mesh_is_believed_where_it_leads_to_zero(slope, looks):
     """Otherwise the function is looked at further off."""
     seen = []
     test = SimpleNamespace(function=lambda s: seen.append(s) or 2 * (s - 1e-8), label="PD")
     place, _, known = refinement._by_secants(lambda s, near=None: s, 0.0, test, slope)
     assert place == pytest.approx(1e-8, abs=1e-15) and known == pytest.approx(2) and len(seen) == looks
+
+
+def test_the_slope_that_a_step_has_seen_is_that_on_finer_meshes(monkeypatch):
+    """So no mesh needs a look further off."""
+    seen, real = [], refinement.zero_again
+
+    def watched(system, x, tangent, test, newton, slope):
+        found = real(system, x, tangent, test, newton, slope)
+        seen.extend([slope / found[2]] if test is not None and test.label == "LP" else [])
+        return found
+
+    monkeypatch.setattr(refinement, "zero_again", watched)
+    trace(solve(bratu(), [0, 0], degree=4), free=["lam"], limits={"lam": (0, 4), "mean": (-1, 1)})
+    assert seen and seen == pytest.approx([1.0] * len(seen), abs=1e-2)
 
 
 def foundation(t, u, p):
