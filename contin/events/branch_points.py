@@ -20,7 +20,7 @@ from contin.core.trial import Trial, same_sign, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
+from contin.events.crossings import calm, changes_little, crossings, is_watched, passed, quotients, quotients_along
 from contin.levels import APART
 from contin.linalg.blocks import Factors
 from contin.linalg.border import smallest_directions
@@ -71,13 +71,15 @@ class BranchPointSearch:
         if not kept:
             before.refactor(row)
             watched = is_watched(before.factors, trial.factors, size)
-        if same and (watched or not kept) and calm(before.factors, trial.factors, size):  # takes long where watched
-            return 0, True
-        if watched and not self._sign_changes:
+            if same and not watched and calm(before.factors, trial.factors, size):
+                return 0, True
+        if watched and same:
             along = quotients_along(
                 functools.cache(lambda part: trial.factors if part == 1 else self._bordered(part, row[None]))
             )
             if along is not None and crossings(along) == (0, True):
+                return 0, True
+            if changes_little(before.factors, trial.factors, size):
                 return 0, True
         if watched and self._without_smallest is not None:
             return self._without_smallest
