@@ -162,7 +162,6 @@ class OpenStrip(Network):
         return {number: {FIRST: "start", LAST: "finish"}.get(name, name) for number, name in super().contacts.items()}
 
     def _functionals(self) -> Mapping[str, Callable]:
-        """Return the place of the last end, as far as it is free."""
         return {name: rate for name, rate in _PLACES.items() if name not in self.parameters}
 
     _sizes: ClassVar[dict[str, float]] = {}  # those of a stage are of its first state

@@ -189,8 +189,9 @@ class Collocation(Composed):
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x."""
-        at, values = (np.ascontiguousarray(each, dtype=float) for each in (times, x)), np.empty((times.size, self._n))
-        interpolate(self.basis.nodes, self.basis.barycentric, self.mesh, *at, values)
+        values, times = np.empty((times.size, self._n)), np.ascontiguousarray(times, dtype=float)
+        given = self.basis.nodes, self.basis.barycentric, self.mesh, times, np.ascontiguousarray(x, dtype=float)
+        interpolate(*given, values)
         return values
 
     def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:

@@ -139,7 +139,6 @@ class Lane(ABC):
             return True
 
     def _index_at(self, trial: Trial) -> int | None:
-        """Return the index at the end of a step, if there is one."""
         return None if self._index is None else self.system.stability(SpecialPoint(0.0, "", "", trial)).index
 
     def _passes(self, before: Trial, trial: Trial) -> bool:
@@ -355,7 +354,6 @@ class Block:
         )  # fmt: skip
 
     def _free(self, x: Array) -> Array:
-        """Return the free parameters in the user's units."""
         return x[..., self._system.state_size :] * self._system.free_scales
 
     def points(self) -> Iterator[tuple[Any, Point]]:

@@ -376,7 +376,6 @@ def _floor_of(value: Any) -> Any:
 
 
 def _truth(tape: Tape, value: object) -> Number:
-    """Return 1 for a condition that holds, else 0."""
     return tape.apply("sub", 1.0, tape.apply("eq", value, 0.0))
 
 

@@ -545,10 +545,8 @@ _WRONG_ARGUMENTS = b"an argument of a kernel is not of the type in its annotatio
 
 
 def _step(builder: ir.IRBuilder, pointer: ir.Value, count: int) -> Any:
-    """Return the address of a later element."""
     return builder.gep(pointer, [ir.Constant(_WORD, count)])
 
 
 def _field(builder: ir.IRBuilder, item: ir.Value, offset: int, kind: ir.Type) -> Any:
-    """Return the field of this type at an offset in bytes."""
     return builder.load(builder.bitcast(_step(builder, item, offset), kind.as_pointer()))

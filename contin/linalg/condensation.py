@@ -113,21 +113,18 @@ def _vectors(work, sizes, part, s):
 
 @helper
 def _move(target, source, count):
-    """Copy ``count`` entries."""
     for k in range(count):
         vector.move(entry(target, k), entry(source, k))
 
 
 @helper
 def _clear(target, count):
-    """Fill ``count`` entries with zeros."""
     for k in range(count):
         vector.clear(entry(target, k))
 
 
 @helper
 def _add(target, source, count):
-    """Add ``count`` entries."""
     for k in range(count):
         vector.add(entry(target, k), entry(source, k))
 

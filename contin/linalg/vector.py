@@ -402,7 +402,6 @@ def apart(builder: Builder, target: Rows, source: int, length: int, rows: int) -
 
 
 def _number(value: int) -> Value:
-    """Return a constant of the machine's integers."""
     return constant(whole(), value)
 
 
@@ -441,7 +440,6 @@ def _load(builder: Builder, address: Value, width: int = 0) -> Value:
 
 
 def _store(builder: Builder, value: Value, address: Value) -> None:
-    """Store a number or a vector at an address."""
     builder.store(value, builder.inttoptr(address, value.type.as_pointer())).align = 8
 
 

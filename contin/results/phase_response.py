@@ -176,5 +176,4 @@ class PhaseResponse:
 
 
 def _unknowns(system: Any, values: Array) -> Array:
-    """Return states at the nodes as a vector of unknowns."""
     return np.append(values.ravel(), np.zeros(system.size - system.state_size))
