@@ -25,7 +25,7 @@ from contin.draws import generator
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc
 from contin.events.inspection import jumped
-from contin.levels import CERTAIN
+from contin.levels import CERTAIN, LOCATED
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class MeshPolicy:
         control = self.steps.settings.mesh
         if state.singular:
             return None
-        fewest = self._fewest_intervals(state)
+        fewest = self._fewest_intervals(state, here)
         half = max(control.min_intervals, state.system.intervals // 2)
         for count in (half, fewest) if self._is_too_fine(state, here) else (fewest,):
             wanted = control if count == control.min_intervals else _with_fewest(control, count)
@@ -237,15 +237,19 @@ class MeshPolicy:
             arc, judgement, accuracy = again, judged_again, better
         return arc, judgement
 
-    def _fewest_intervals(self, state: State) -> int:
+    def _fewest_intervals(self, state: State, here: Callable[[], Trial]) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
 
         An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
+        What Newton's method leaves on a path does not grow there, either. Connections keep their meshes then: inclination flips
+        depend on the mesh more than orbits do.
         """
         control, now, error = self.steps.settings.mesh, state.system.intervals, state.discretization_error
         if math.isnan(error) or not now:
             return control.min_intervals
         far_below = error < _FAR_BELOW * control.tolerance
+        if not far_below and now > _FAR_TOO_MANY * control.min_intervals and self.steps.settings.newton.tolerance > LOCATED:
+            far_below = state.system.size_of_solutions is not None and accuracy_of(here()).is_round_off
         count = now // 2 if far_below else min(_intervals_for(state.system, error, control), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
