@@ -189,9 +189,9 @@ class Collocation(Composed):
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x."""
-        values, times = np.empty((times.size, self._n)), np.ascontiguousarray(times, dtype=float)
-        given = self.basis.nodes, self.basis.barycentric, self.mesh, times, np.ascontiguousarray(x, dtype=float)
-        interpolate(*given, values)
+        at, given = np.ascontiguousarray(times, dtype=float), (self.basis.nodes, self.basis.barycentric, self.mesh)
+        values = np.empty((at.size, self._n))
+        interpolate(*given, at, np.ascontiguousarray(x, dtype=float), values)
         return values
 
     def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:
