@@ -209,13 +209,12 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> _Found:
     """
     moves: Any = 0.0
     for _ in range(ROUNDS):
-        system = found.trial.system
-        moved = system.on_switches(found.trial.x, closely=True)
+        trial = found.trial
+        moved = trial.system.on_switches(trial.x, closely=True)
         if moved is None:
             break
-        before = found.trial.x[system.state_size :]
         found = _again(point, found, moved, newton)
-        moves = np.abs(found.trial.x[system.state_size :] - before)
+        moves = np.abs(found.trial.x[moved[0].state_size :] - trial.x[trial.system.state_size :])
     if found.left:
         moves = moves + found.left * np.abs(found.trial.tangent[found.trial.system.state_size :])
     return found._replace(left=moves)
