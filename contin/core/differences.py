@@ -62,9 +62,9 @@ def derivative(function: Callable[[float], Any], order: int = 1, size: float = 1
     best, least = np.full(middle.shape, np.nan), np.inf
     length = _LENGTHS[order] * size
     for _ in range(_TIMES):
-        fourth, second = _differences(function, middle, order, length)
+        (fourth, second), most = _differences(function, middle, order, length)
         scale, apart = _largest(fourth), _largest(fourth - second)
-        round_off = _EPSILON * _largest(middle) / length**order
+        round_off = _EPSILON * most / length**order
         error = min(apart, _SAFE * apart * apart / scale if scale else 0.0) + round_off
         if error < least:  # not where values are not finite
             best, least = fourth, error
@@ -85,15 +85,16 @@ def _largest(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def _differences(function: Callable[[float], Any], middle: Array, order: int, h: float) -> Array:
-    """Return differences of a length, of fourth order and of second."""
+def _differences(function: Callable[[float], Any], middle: Array, order: int, h: float) -> tuple[Array, float]:
+    """Return differences of a length, of fourth order and of second, and the largest value."""
     weights = _WEIGHTS[order]
     count = int(np.count_nonzero(weights[0]))
-    total = np.zeros((2, *middle.shape))
+    total, most = np.zeros((2, *middle.shape)), _largest(middle)  # zero where the function is, but not its round-off
     for k in range(count):
         ahead, behind = (np.asarray(function(s * (k + 1) * h), dtype=float) for s in (1, -1))
+        most = max(most, _largest(ahead), _largest(behind))
         total += np.multiply.outer(weights[:, k], ahead - behind if order % 2 else ahead + behind - 2 * middle)
-    return total / h**order
+    return total / h**order, most
 
 
 #: Numbers of directions.

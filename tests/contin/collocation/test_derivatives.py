@@ -146,3 +146,11 @@ def test_differences_know_their_error(order, width):
     value, error = derivative(lambda s: math.sin(1 + s / width), order)
     exact = [math.cos(1), -math.sin(1), -math.cos(1)][order - 1] / width**order
     assert abs(value - exact) < error < 1e-4 * abs(exact)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_differences_of_a_function_that_is_zero_there(order):
+    """Its round-off is that of its terms: lengths are not shortened into it."""
+    for a in np.random.default_rng(0).uniform(1, 2, 200):
+        value, _ = derivative(lambda s: (a + s) ** (order - 1) - a ** (order - 1), order)  # noqa: B023
+        assert abs(value) < 1e-7
