@@ -313,7 +313,7 @@ def _by_secants(at: Callable[..., Trial], here: Trial, test: Event, slope: float
     value = test.function(here)
     if value == 0:
         return here, 0.0, slope
-    best, s = (0.0, value, here), -value / slope
+    best, s = (0.0, value, here), -value / (slope or np.nan)
     if abs(s) < CORRECTED:
         return at(s, (0.0, here)), abs(s), slope
     near = other = place(s) if abs(s) < ROUGH else best
