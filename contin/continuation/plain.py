@@ -83,7 +83,7 @@ def _made(rooms: Rooms, path: Path, number: int) -> float:
 
 @helper
 def calm(quotient: Quotient) -> bool:
-    """Return whether no singular value comes near zero, by the quotient, as `contin.events.crossings.calm`."""
+    """Return whether no singular value comes near zero, by the quotient, as `contin.events.crossings.changes_little`."""
     if is_near_one(quotient.quotient, NEAR_ONE, CALM, quotient.work):
         return True
     size = quotient.quotient.shape[0]

@@ -20,7 +20,7 @@ from contin.core.trial import Trial, same_sign, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.events.crossings import calm, changes_little, crossings, is_watched, passed, quotients, quotients_along
+from contin.events.crossings import changes_little, crossings, known_quotients, passed, quotients, quotients_along, shares
 from contin.levels import APART
 from contin.linalg.blocks import Factors
 from contin.linalg.border import smallest_directions
@@ -62,35 +62,41 @@ class BranchPointSearch:
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         row, size = state.row, state.system.size
         same = same_sign(before.sign, trial.sign)
-        kept = before.factors is not None  # bordered by a row of the step before
-        watched = kept and is_watched(before.factors, trial.factors, size)
-        if same and kept and not watched and calm(before.factors, trial.factors, size):
-            return 0, True
-        if same and state.system.cannot_branch(self.arc):
-            return 0, True
+        kept = before.factors is not None  # bordered by a row of the step before, along which the branch goes on as well
         if not kept:
+            if same and state.system.cannot_branch(self.arc):
+                return 0, True
             before.refactor(row)
-            watched = is_watched(before.factors, trial.factors, size)
-            if same and not watched and calm(before.factors, trial.factors, size):
+        known = known_quotients(before.factors, trial.factors, size)
+        if known is not None and (decided := self._decided(known, shares(known))):
+            return decided
+        if kept and same and state.system.cannot_branch(self.arc):
+            return 0, True
+        if known is None:
+            ends = {0.0: before.factors, 1.0: trial.factors}
+            along = quotients_along(functools.cache(lambda part: ends.get(part) or self._bordered(part, row[None])))
+            if along is not None and (decided := self._decided(*along)):
+                return decided
+            if same and changes_little(before.factors, trial.factors, size):
                 return 0, True
-        if watched and same:
-            along = quotients_along(
-                functools.cache(lambda part: trial.factors if part == 1 else self._bordered(part, row[None]))
-            )
-            if along is not None and crossings(along) == (0, True):
-                return 0, True
-            if changes_little(before.factors, trial.factors, size):
-                return 0, True
-        if watched and self._without_smallest is not None:
-            return self._without_smallest
+            if self._without_smallest is not None:
+                return self._without_smallest
         if kept:
             before.refactor(row)
         values = quotients(before.factors, trial.factors, size)
-        self._shares = np.sort(_shares(values[values.real < 0]))
         count, clear = crossings(values)
         if (count > 1 or not clear) and self._without_smallest is not None:
             return self._without_smallest
+        self._shares = np.sort(shares(values[values.real < 0]))
         return count, clear and (not self._says_sign or (count % 2 == 1) == self._sign_changes)
+
+    def _decided(self, values: ComplexArray, places: Array) -> tuple[int, bool] | None:
+        """Return the count, and keep where a branch point is expected, if quotients show one or none, as the sign does."""
+        count, clear = crossings(values)
+        if not clear or count > 1 or (self._says_sign and (count == 1) != self._sign_changes):
+            return None
+        self._shares = places[values.real < 0] if count else self._shares
+        return count, True
 
     @functools.cached_property
     def _without_smallest(self) -> tuple[int, bool] | None:
@@ -123,15 +129,14 @@ class BranchPointSearch:
         changes = sign_changed(g[0], g[1])
         if not np.isfinite(g).all() or (self._says_sign and changes != self._sign_changes):
             return None
-        values = quotients_along(matrix)
-        if values is None:
-            values = quotients(first, last, size + 1)
+        along = quotients_along(matrix)
+        values = quotients(first, last, size + 1) if along is None else along[0]
         if not np.isfinite(values).all():
             return 0, False
         if crossings(values) != (0, True) or not same_sign(first.sign, last.sign):
             return None
         if changes:
-            self._shares = _shares(np.array([g[0] / g[1]]))
+            self._shares = shares(np.array([g[0] / g[1]]))
             return 1, True
         if np.sign(matrix(0.5).solve(unit)[-1]) == np.sign(g[0]):
             return 0, True
@@ -247,11 +252,5 @@ class BranchPointSearch:
         there.refactor(arc.state.row)
         values = quotients(arc.before.factors, there.factors, arc.state.system.size)
         passing, vanishing = passed(values)
-        shares = _shares(values[passing | vanishing])
-        return 0 < len(shares) < count or (len(shares) == count and float(np.ptp(shares)) > _TOGETHER)
-
-
-def _shares(values: ComplexArray) -> Array:
-    """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
-    sizes = np.abs(values)
-    return 1 - 1 / (1 + sizes)  # an infinite one, too
+        places = shares(values[passing | vanishing])
+        return 0 < len(places) < count or (len(places) == count and float(np.ptp(places)) > _TOGETHER)

@@ -84,28 +84,52 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
     return _all(before, after, size) if size <= _MEDIUM else found
 
 
-def quotients_along(factors: Callable[[float], Factors]) -> ComplexArray | None:
+def known_quotients(before: Any, after: Any, size: int) -> ComplexArray | None:
+    """Return the same where all of them are at hand, of small or condensed matrices; None elsewhere.
+
+    They are ones where the quotient is so near to the identity that nothing comes near zero.
+    """
+    dense = isinstance(before, DenseFactors) and isinstance(after, DenseFactors)
+    quotient = after.solve(before.matrix.T) if dense and size <= _SMALL else _condensed(before, after)
+    if quotient is None:
+        return _all(before, after, size) if size <= _SMALL else None
+    quotient = np.ascontiguousarray(quotient)
+    near = is_near_one(quotient, NEAR_ONE, CALM, np.empty(quotient.shape))
+    return np.ones(1, complex) if near else _finite_eigenvalues(quotient)
+
+
+def quotients_along(factors: Callable[[float], Factors]) -> tuple[ComplexArray, Array] | None:
     """Return how singular values change from each of some places of a step to the next, where condensed matrices decide.
 
-    They are eigenvalues of the quotients, NaN where relations turn too much; None where matrices are not condensed.
-    ``factors`` returns those of [F_x; row] at a part of the step, from 0 to 1.
+    They are eigenvalues of the quotients, NaN where relations turn too much, and the parts of the step at which those that pass
+    zero do so; None where matrices are not condensed. ``factors`` returns those of [F_x; row] at a part of the step.
     """
     if not _is_condensed(factors(1.0)):
         return None
-    quotients = list(_along(factors, 0.0, 1.0, _HALVINGS))
-    return np.concatenate([np.full(1, np.nan, complex) if found is None else _finite_eigenvalues(found) for found in quotients])
+    values, places = [], []
+    for start, end, found in _along(factors, 0.0, 1.0, _HALVINGS):
+        values.append(np.full(1, np.nan, complex) if found is None else _finite_eigenvalues(found))
+        places.append(start + (end - start) * shares(values[-1]))
+    return np.concatenate(values), np.concatenate(places)
 
 
-def _along(factors: Callable[[float], Factors], start: float, end: float, halvings: int) -> Iterator[Array | None]:
-    """Yield quotients of condensed matrices over pieces of a step, halved where these do not decide; None, last, in the end."""
+def shares(values: ComplexArray) -> Array:
+    """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
+    return 1 - 1 / (1 + np.abs(values))  # an infinite one, too
+
+
+def _along(
+    factors: Callable[[float], Factors], start: float, end: float, halvings: int
+) -> Iterator[tuple[float, float, Array | None]]:
+    """Yield pieces of a step, halved where condensed matrices do not decide, and their quotients; None, last, in the end."""
     quotient = _condensed(factors(start), factors(end))
     if quotient is not None or not halvings:
-        yield quotient
+        yield start, end, quotient
         return
     middle = (start + end) / 2
-    for quotient in _along(factors, start, middle, halvings - 1):
-        yield quotient
-        if quotient is None:
+    for piece in _along(factors, start, middle, halvings - 1):
+        yield piece
+        if piece[2] is None:
             return
     yield from _along(factors, middle, end, halvings - 1)
 
@@ -123,11 +147,6 @@ def _condensed(before: Any, after: Any) -> Array | None:
         return None
     quotient, turn = compared(before.ends, after.ends)
     return quotient if turn < TURN and np.isfinite(quotient).all() else None
-
-
-def is_watched(before: Factors, after: Factors, size: int) -> bool:
-    """Return whether the quotient is so large that not all its eigenvalues are computed, and nothing condensed decides."""
-    return size > _SMALL and _condensed(before, after) is None
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:
@@ -229,16 +248,11 @@ def _eigenvalues(earlier: Array, later: Array) -> tuple[ComplexArray, ComplexArr
     return np.full(len(later), np.nan, dtype=complex), np.full(later.shape, np.nan, dtype=complex)
 
 
-def calm(before: Factors, after: Factors, size: int) -> bool:
-    """Return whether no singular value comes anywhere near zero between two points, be it from approximate factors."""
-    if size <= _SMALL and isinstance(before, DenseFactors) and isinstance(after, DenseFactors):
-        return _is_near_one(after.solve(before.matrix.T))
-    condensed = _condensed(before, after)
-    return changes_little(before, after, size) if condensed is None else _is_near_one(condensed)
-
-
 def changes_little(before: Factors, after: Factors, size: int) -> bool:
-    """Return the same by the directions in which the inverses differ most, where nothing condensed decides."""
+    """Return whether no singular value comes anywhere near zero between two points, be it from approximate factors.
+
+    The directions in which the inverses differ most tell it, where nothing condensed decides.
+    """
     if size <= _SMALL:
         return _is_calm(_all(before, after, size))
     watch = _Watch(before, after, size)
@@ -251,14 +265,6 @@ def changes_little(before: Factors, after: Factors, size: int) -> bool:
         if decided is not None:
             return _is_calm(decided)
     return False
-
-
-def _is_near_one(quotient: Array) -> bool:
-    """Return whether a quotient is so near to the identity, or its eigenvalues so near to one, that nothing comes near zero."""
-    quotient = np.ascontiguousarray(quotient)
-    if is_near_one(quotient, NEAR_ONE, CALM, np.empty(quotient.shape)):
-        return True
-    return _is_calm(_finite_eigenvalues(quotient))
 
 
 def _is_calm(values: ComplexArray) -> bool:

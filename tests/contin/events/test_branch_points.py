@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from contin.events.branch_points import _shares
+from contin.events.crossings import shares
 
 
 def test_quotients_of_any_size():
     """A singular value that was zero at the start, or is at the end, has passed there: quotients 0 and infinity, no warning."""
-    assert _shares(np.array([0, -1, -np.inf], dtype=complex)).tolist() == [0, 0.5, 1]
+    assert shares(np.array([0, -1, -np.inf], dtype=complex)).tolist() == [0, 0.5, 1]
