@@ -178,12 +178,15 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
     trial, system = found.trial, found.trial.system
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
     stability = Stability() if index is None else system.stability(found)
+    functionals = trial.functionals if system.on_curve or system.thawed is not system else {}
     point = Point(
-        str(found.label), found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system.thawed, arclength,
+        str(found.label), found.full_name, parameters, functionals, trial.x, trial.tangent, system.thawed, arclength,
         trial.iterations, trial.newton_error, found.errors or {}, found.details,
         stability.index, stability.nullity, change, stability.breaks,
         *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,
     )  # fmt: skip
+    if not functionals:  # they are computed when they are first asked for
+        del vars(point)["functionals"]
     if found.coarse is not None:
         del vars(point)["name"], vars(point)["details"]
         vars(point)["_told"] = functools.partial(_with_normal_form, _kept(found), _kept(found.coarse))

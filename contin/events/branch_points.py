@@ -64,13 +64,11 @@ class BranchPointSearch:
         same = same_sign(before.sign, trial.sign)
         kept = before.factors is not None  # bordered by a row of the step before, along which the branch goes on as well
         if not kept:
-            if same and state.system.cannot_branch(self.arc):
-                return 0, True
             before.refactor(row)
         known = known_quotients(before.factors, trial.factors, size)
         if known is not None and (decided := self._decided(known, shares(known))):
             return decided
-        if kept and same and state.system.cannot_branch(self.arc):
+        if same and state.system.cannot_branch(self.arc):
             return 0, True
         if known is None:
             ends = {0.0: before.factors, 1.0: trial.factors}

@@ -46,7 +46,7 @@ class Record:
     discretization_error: float = np.nan
 
     def __getattr__(self, name: str) -> Any:
-        """Return what is computed when first asked for: functionals of plain steps, a name or details with a normal form."""
+        """Return what is computed when first asked for: functionals, a name or details with a normal form."""
         known = vars(self)
         if name == "functionals" and "system" in known:
             known[name] = Trial.without_tangent(self.system, self.x).functionals
