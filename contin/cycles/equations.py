@@ -13,6 +13,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.boundary.system import Collocation
+from contin.collocation.assembly import Bordering, assemble
 from contin.collocation.corners import breaks_of
 from contin.collocation.mesh import moved_to_breaks
 from contin.collocation.round import DRIFTED, FULL, Monodromy, ends_of_parts, extremes, fill_multipliers, larger, monodromy_of
@@ -31,9 +32,9 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.error import Solution
 from contin.events.normal_forms import Coefficient, at_special_point
 from contin.levels import APART, DOUBLED, LOCATED, ROUGH
-from contin.linalg.blocks import Blocks, Factors
+from contin.linalg.blocks import Blocks, Factors, share
 from contin.linalg.condensation import Factorization
-from contin.linalg.periodic import interval_matrices, log_eigenvalues
+from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.statement import PERIOD, rounds_of
 
@@ -255,15 +256,16 @@ class PeriodicCollocation(OfCycles, Collocation):
 
     def with_conditions(self, x: Array, rows: Array) -> Factors:
         """Return the factored linearized collocation equations with n conditions on the states at both ends: rows (n, 2 n)."""
-        jacobian, n = self._jacobian_of_field(x), self._n
-        matrices = interval_matrices(self.basis.value, self.basis.slope, self._h, jacobian)
-        columns = np.concatenate([self._layout.inside, self._layout.ends])
-        border = np.empty((self.intervals, 0, len(columns)))
-        local = np.ascontiguousarray(matrices[:, self._layout.rows[:, None], columns])
+        n, width = self._n, self._n * (self.degree + 1)
+        jacobian = np.ascontiguousarray(self._jacobian_of_field(x)[:, :, self._layout.order])
+        local, border = np.empty((self.intervals, width - n, width)), np.empty((self.intervals, 0, width))
+        around = Bordering(np.empty((0, self.state_size)), np.empty((0, self.state_size)))
+        blocks = Blocks(local, border, np.empty((0, 0)), *np.empty((2, n, n)))
+        given = self._layout, self.tables, self._h, jacobian, np.ascontiguousarray(rows)[None], around, blocks
+        assemble(*given, share(self.intervals, 0))
         for each in self.crossings(x):
             local[each.node][:, self._left] = local[each.node][:, self._left] @ each.by_states
-        first, last = np.ascontiguousarray(rows[:, :n]), np.ascontiguousarray(rows[:, n:])
-        return Factorization(self._layout, Blocks(local, border, np.empty((0, 0)), first, last))
+        return Factorization(self._layout, blocks)
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.

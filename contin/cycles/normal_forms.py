@@ -224,8 +224,9 @@ class Round:
     @functools.cached_property
     def free_by_period(self) -> Array:
         """The v with C v = h F and H v = 0, shape (1, states)."""
-        by_period = self.system.parameter_columns(self._x, (PERIOD,))[: self.collocated.inside]
-        return -self.collocated.solve(by_period.T)
+        system: Any = self.system  # an autonomous one: F is proportional to the period
+        rates = system.rates(self._x, system.at_gauss_points(self._x)) / self._x[system.parameter_index(PERIOD)]
+        return self.collocated.solve((np.repeat(np.diff(system.mesh), system.degree)[:, None] * rates).reshape(1, -1))
 
     def solver(self, coupling: complex | Numbers, border: tuple[Array, Array] | None = None) -> Solver:
         """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""

@@ -275,25 +275,6 @@ def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vect
             real[at], imaginary[at] = x, y
 
 
-def interval_matrices(value: Array, slope: Array, h: Array, jacobian: Array) -> Array:
-    """Return the collocation equations of each interval, shape (N, d n, (d + 1) n), by its nodes in order.
-
-    ``value`` and ``slope`` (d, d + 1) are tables of the `Basis`; the Jacobian (N d, n, n) of the right-hand side is that at the
-    Gauss points.
-    """
-    d, n = len(value), jacobian.shape[1]
-    matrices = np.empty((len(h), d * n, (d + 1) * n))
-    fill(value, slope, h, jacobian, matrices)
-    return matrices
-
-
-@kernel(reorder=False, last=True)
-def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, matrices: Stack) -> None:
-    """Fill the equations of the intervals."""
-    for j in range(h.size):
-        _fill_block(value, slope, h[j], jacobian, j * value.shape[0], 0, matrices[j])
-
-
 @helper
 def _fill_block(value, slope, h, jacobian, first, turn, block):
     """Fill the equations of one interval, with the Gauss points from ``first`` on, by its nodes turned by so many places."""

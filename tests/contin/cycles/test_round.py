@@ -11,7 +11,6 @@ import contin
 from contin import CycleProblem
 from contin.collocation.round import monodromy_of
 from contin.cycles.normal_forms import Round
-from contin.linalg.periodic import interval_matrices
 
 
 def spread(u, p):
@@ -59,7 +58,9 @@ def whole_matrix(system, x, phased, coupling, b, c):
     """The matrix that `contin.cycles.normal_forms` draws, dense."""
     states, n = system.state_size, system.states_count
     jacobian = system.rates_by_states(x, system.at_gauss_points(x))
-    matrices = interval_matrices(system.basis.value, system.basis.slope, np.diff(system.mesh), jacobian)
+    tables, h, by_point = system.basis, np.diff(system.mesh), jacobian.reshape(system.intervals, -1, n, n)
+    local = np.einsum("qm,ab->qamb", tables.slope, np.eye(n)) - np.einsum("j,qm,jqab->jqamb", h, tables.value, by_point)
+    matrices = local.reshape(len(h), -1, (system.degree + 1) * n)
     count, rows, columns = matrices.shape
     size, copies = states + phased, len(coupling)
     whole = np.zeros((copies * (size + 1), copies * (size + 1)), dtype=np.result_type(coupling, b, c))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contin.collocation.mesh import basis
-from contin.linalg.periodic import condense, interval_matrices, log_eigenvalues
+from contin.linalg.periodic import condense, log_eigenvalues
 
 
 def chain(diagonals, seed=0):
@@ -44,10 +44,10 @@ def test_transition_matrices_solve_the_collocation_equations(n, degree):
     """A perturbation of one at the left end and what the equations make of it at the right end, by a dense solve."""
     tables, h, random = basis(degree), np.array([0.2, 0.5, 0.3]), np.random.default_rng(2)
     jacobian = random.standard_normal((3 * degree, n, n))
-    matrices = interval_matrices(tables.value, tables.slope, h, jacobian)
-    node, point = 1, 2 * degree + 1  # of the last interval: S - h value J
-    expected = tables.slope[1, node] * np.eye(n) - h[2] * tables.value[1, node] * jacobian[point]
-    assert matrices[2, n : 2 * n, node * n : (node + 1) * n] == pytest.approx(expected, abs=1e-14)
+    by_node = np.einsum("qm,ab->qamb", tables.slope, np.eye(n)) - np.einsum(
+        "j,qm,jqab->jqamb", h, tables.value, jacobian.reshape(3, degree, n, n)
+    )
+    matrices = by_node.reshape(3, degree * n, -1)
     solved = np.linalg.solve(matrices[:, :, n:], -matrices[:, :, :n])[:, -n:]
     found, block = np.empty((3, n, n)), np.empty((degree * n, (degree + 1) * n))
     condense(tables.value, tables.slope, h, jacobian, block, np.empty((degree + 1) * n, np.int64), found)
