@@ -19,7 +19,7 @@ from contin import draws
 from contin.arrays import Array, Indices, Places
 from contin.boundary.crossings import Crossing, crossing_places, crossings, frozen, next_places, outcomes, stepped
 from contin.boundary.grazing import contradiction, grazing, jumping, touch_ahead, with_sides_near
-from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row, interpolate
+from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row, interpolate, to_nodes
 from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of, joined, selections, switching
 from contin.collocation.defect import Defect
 from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near
@@ -55,15 +55,6 @@ _TIME = np.zeros(1)
 def _NONE(n: int) -> Array:
     """Return the absent second state of a function of one point."""
     return np.empty((0, n))
-
-
-def _by_node(blocks: Array) -> Array:
-    """Return what nodes have of all intervals, (N d + 1, n), from what each interval gives to its own, (N, d + 1, n)."""
-    count, nodes, n = blocks.shape
-    found = np.zeros((count * (nodes - 1) + 1, n))
-    found[:-1] = blocks[:, :-1].reshape(-1, n)
-    found[nodes - 1 :: nodes - 1] += blocks[:, -1]
-    return found
 
 
 class Collocation(Composed):
@@ -148,7 +139,8 @@ class Collocation(Composed):
         self.size = self.state_size + len(self.free)
         self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
         self.equations = self._conditions
-        node_weights = _by_node((h[:, None] * self.basis.node_weights / (b - a))[:, :, None])[:, 0]
+        node_weights = np.empty(h.size * degree + 1)
+        to_nodes(self.basis.value, self.gauss_weights[:, None] / (b - a), node_weights)
         #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
         self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
 
@@ -596,8 +588,8 @@ class Collocation(Composed):
         """Return F_x^T w, shape (size,), for w (equations,)."""
         inside, ends = self._terms
         result = inside.transposed(x, w) + ends.transposed(x, w)
-        rates = self.basis.slope.T @ w[: self._inner].reshape(self.intervals, self._d, self._n)
-        result = result + self._gathered(rates, np.zeros(len(self.free)))
+        rates = np.pad(w[: self._inner].reshape(-1, self._n), ((0, 0), (0, len(self.free))))
+        result = result + self._to_nodes(rates, self.basis.slope)
         return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
 
     @property
@@ -616,17 +608,14 @@ class Collocation(Composed):
         """Return the gradients of a few random combinations of the equations, which show what outcomes change."""
         return np.array([self.transposed_product(x, w) for w in random_rows(draws.DRAWS, self.equations)])
 
-    def _to_nodes(self, slopes: Array) -> Array:
-        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
-        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        return self._gathered(self.basis.value.T @ by_points, np.add.reduce(slopes[:, self._n :]))
-
-    def _gathered(self, blocks: Array, free: Array) -> Array:
-        """Return derivatives by x, shape (size,), from those by the states of each interval, (N, d + 1, n), and others."""
+    def _to_nodes(self, slopes: Array, values: Array | None = None) -> Array:
+        """Return derivatives by x from those at Gauss points, (N d, n + k), by nodes' ``values`` (d, d + 1) there."""
+        found, values = np.empty(self.state_size - self._n + slopes.shape[1]), self.basis.value if values is None else values
+        to_nodes(values, np.ascontiguousarray(slopes), found)
         for each in self._last_crossings:
-            free = free + blocks[each.node, 0] @ each.shift_by_x[:, self._n :]
-            blocks[each.node, 0] = blocks[each.node, 0] @ each.by_states
-        return np.concatenate([_by_node(blocks).ravel(), free])
+            of_points = slopes[self._d * each.node :][: self._d, : self._n]
+            found[self._beside(each)] += values[:, 0] @ of_points @ each.shift_by_x
+        return found
 
     # --- functionals ---------------------------------------------------------------------------------------------
 

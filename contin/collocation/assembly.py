@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contin.kernels.kernel import kernel
-from contin.kernels.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.kernels.kernel_parts import Matrix, ReadOnlyMatrix, ReadOnlyVector, Stack, Vector, helper
 from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.elimination import Range
 from contin.linalg.vector import address, scale_into
@@ -26,6 +26,25 @@ def at_points(value: Matrix, x: ReadOnlyVector, points: Matrix) -> None:
                 factor, start = value[i, node], (j * d + node) * n
                 for a in range(n):
                     row[a] += factor * x[start + a]
+
+
+@kernel
+def to_nodes(value: Matrix, slopes: ReadOnlyMatrix, by_x: Vector) -> None:
+    """Fill ``by_x`` with derivatives by nodal values and parameters from those at the Gauss points, (N d, n + k)."""
+    d = value.shape[0]
+    count, width = slopes.shape
+    n, last = (by_x.size - width) // count, by_x.size - width
+    for k in range(by_x.size):
+        by_x[k] = 0.0
+    for j in range(count // d):
+        for i in range(d):
+            row = slopes[j * d + i]
+            for node in range(d + 1):
+                factor, start = value[i, node], (j * d + node) * n
+                for a in range(n):
+                    by_x[start + a] += factor * row[a]
+            for a in range(n, width):
+                by_x[last + a] += row[a]
 
 
 @kernel(reorder=False)
