@@ -33,7 +33,7 @@ from contin.levels import BESIDE, ROUGH
 #: polynomial through the first, and that of the nodes on another mesh.
 _NODES = 12, 10
 #: Half the width of the interval of the nodes as parts of the step: narrow ones suffer from nodes that are close to the zero,
-#: wide ones from bends of the curve. Narrower ones are tried as long as they lower the estimated error.
+#: wide ones from bends of the curve. Narrower ones are tried as long as they lower an estimated error above the tolerance.
 _WIDTHS = (2.0, 1.0, 0.5, 0.25)
 #: Points that an extrapolation goes through, at most, and points without one, which lie close to the beginning of the step.
 _BEHIND, _FEWEST = 6, 2
@@ -113,9 +113,10 @@ def interpolated_zero(arc: Arc, functions: Functions, near: float) -> Interpolat
         except ConvergenceError:
             continue
         change = float(np.abs(found.trial.x - other.trial.x).max())
-        if not change < least:
+        if change < least:
+            best, least = found, change
+        if not arc.newton.tolerance < change <= least:
             break
-        best, least = found, change
     return best
 
 
