@@ -197,15 +197,14 @@ class BranchPoint(Finding):
         >>> bool(locate_branch_point(system, np.array([0.1, 1.1])).round_off(system, Newton()).max() < 1e-15)
         True
         """
-        random, noise = generator("branch point"), np.zeros_like(self.x)
+        random, x, noise = generator("branch point"), self.x, np.zeros_like(self.x)
         with np.errstate(all="ignore"):
-            search = _Search(system, self.x, newton, (self.kernel, self.left), self.hessian)
             for _ in range(draws.DRAWS):
-                search.x = before = draws.rounded(random, search.x)
+                before = draws.rounded(random, x)
+                search = _Search(system, before, newton, (self.kernel, self.left), self.hessian)
                 if not search.advance():
                     break
-                noise = np.maximum(noise, np.abs(search.x - before))
-                search.forget()
+                x, noise = search.x, np.maximum(noise, np.abs(search.x - before))
         return noise[system.state_size :]
 
     @property
@@ -328,10 +327,6 @@ class _Search:
         self.size = float(np.max(np.abs(update) / (1 + np.abs(self.x))))  # the x before: a huge update makes a huge x
         self.x = self.x - update
         return bool(np.isfinite(self.size) and self.size <= _GONE)
-
-    def forget(self) -> None:
-        """Forget the last update: the next is no continuation of it."""
-        self._drop = np.zeros(2)
 
     @property
     def converged(self) -> bool:

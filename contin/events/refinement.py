@@ -19,8 +19,8 @@ from contin.core.step import ROUNDS, corrected, located, standing_at
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint, Value, find_zero
-from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.events.labelled import Elsewhere, Finding, finding_of
+from contin.events.branch_point import locate_branch_point
+from contin.events.labelled import Elsewhere, finding_of
 from contin.levels import CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 
@@ -90,11 +90,12 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     The first finer mesh of one whose error is above that tolerance, as on a path that is less exact, is made for the tolerance.
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
     is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
-    and has no errors. Where halving the mesh no longer brings it much closer, it moves by round-off: its error is the larger of
-    the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further than on the one before,
-    only the estimate is made: the point stays on the one before.
+    and has no errors. What is left after two moves follows from the last one by the order that both have, unless it is below
+    the tolerance of Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its
+    error is the larger of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further
+    than on the one before, only the estimate is made: the point stays on the one before.
     """
-    trial, details, before, last = point.trial, point.details, np.zeros(1), np.inf
+    trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
     if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
         return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
@@ -114,29 +115,36 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
             break
         system = better.system
-        steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
         least = LAST_PLACES * size.max()
+        steps = moves = np.maximum(np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :]), least)
         if made:
-            steps = steps * _part_left(trial, better)
+            steps = moves * _part_left(trial, better)
             if point.test is not None and point.test.holds_one_of(system.free) and not system.on_curve:
                 steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
         steps = np.maximum(steps, least)
-        left = left + finding_of(found).round_off(system, settings.newton)
         moved = float(np.max(steps / size))
         if np.any(steps > _FAR * size):
             is_lost = last == np.inf
             break
+        too_fine = system.intervals > settings.mesh.max_intervals and settings.mesh.every
+        if seen and not too_fine:
+            part = _part_by_order(*seen, moved, system.degree)
+            steps, left = np.maximum(part * steps, np.minimum(steps, settings.newton.tolerance * size)), _SAFE * left
+        if made or finer:
+            seen = float(np.max(moves / size)), np.log2(system.intervals / coarse.intervals)
         settled = np.maximum(np.maximum(settings.mesh.tolerance * size, left), least) >= steps
         change = np.maximum(steps, before) if moved > _CLOSER * last else steps
         known = change + left + finding_of(found).split(system)  # a curve of branch points has one unknown more
-        errors = dict(zip(system.free, map(float, known[: len(system.free)] * system.free_scales)))
-        if moved > last or not (made or finer) or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
+        if moved > last or not (made or finer) or too_fine:
             break  # such a mesh serves the estimate only
         trial, details = better, found
         if np.all(settled) or moved > _CLOSER * last:
             break
         before, last = steps, moved
+    if known is not None:
+        known = (known + finding_of(details).round_off(trial.system, settings.newton))[: len(errors)]
+        errors = dict(zip(errors, map(float, known * trial.system.free_scales)))
     return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings), details, is_lost)
 
 
@@ -169,6 +177,14 @@ def _part_left(coarse: Trial, better: Trial) -> float:
     """
     order = (coarse.system.intervals / better.system.intervals) ** coarse.system.degree
     return min(_SAFE * max(order, better.discretization_error / coarse.discretization_error), 1.0)
+
+
+def _part_by_order(before: float, halvings: float, now: float, degree: int) -> float:
+    """Return the part of a move to a halved mesh that may be left there: _SAFE times what the order of both moves says.
+
+    The order counts up to 3/4 of that of fine meshes: one of both moves may be small by chance.
+    """
+    return min(_SAFE * max((now / before) ** (1 / halvings), 0.5 ** (1.5 * degree)), 1.0)
 
 
 def _with_cut_off(
@@ -226,26 +242,14 @@ def _again(point: SpecialPoint, coarse: _Found, finer: tuple[Discretization, Car
     Raises ConvergenceError where it was not found, or another one was.
     """
     (system, carry), (trial, details, _, slope) = finer, coarse
-    known = _NEAREST if details is None and point.label == Label.BRANCH_POINT and point.test is None else finding_of(details)
-    if known.has_equations:
-        found = known.again(system, carry, trial.x, newton)
+    if details is None and point.label == Label.BRANCH_POINT and point.test is None:  # a first point: its kernel is not known
+        found: Any = locate_branch_point(system, carry(trial.x), newton)
+        return _Found(found.there(system, carry(trial.tangent)), found)
+    if finding_of(details).has_equations:
+        found = finding_of(details).again(system, carry, trial.x, newton)
         return _Found(found.there(system, carry(trial.tangent)), found)
     zero, apart, slope = zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton, slope)
     return _Found(zero, details, apart, slope)
-
-
-class _Nearest(Finding):
-    """The branch point nearest to a point, where no kernel is known."""
-
-    has_equations = True
-
-    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> BranchPoint:
-        """Return that on another mesh."""
-        return locate_branch_point(system, carry(x), newton)
-
-
-#: Stands for what a first point that is a branch point has found: nothing yet.
-_NEAREST = _Nearest()
 
 
 def zero_again(

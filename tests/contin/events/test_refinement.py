@@ -128,3 +128,10 @@ def test_a_zero_in_round_off_is_known_to_where_the_function_grows(place, noise):
 def test_what_does_not_change_its_sign_is_no_zero(function):
     with pytest.raises(ConvergenceError, match="not found again"):
         refinement._known_to(function)
+
+
+@pytest.mark.parametrize(("ratio", "part"), [(2**-3, 1.0), (2**-6, 2**-3), (2**-9, 2**-6), (2**-12, 2**-6)])
+def test_what_is_left_after_two_moves_follows_from_their_order(ratio, part):
+    """Degree 6, meshes halved: 8 times the ratio of the moves, which counts down to 2^-9; or all of the last move."""
+    assert refinement._part_by_order(1e-7, 1.0, 1e-7 * ratio, 6) == pytest.approx(part)
+    assert refinement._part_by_order(1e-7, 2.0, 1e-7 * ratio**2, 6) == pytest.approx(part)  # the first of four times as many
