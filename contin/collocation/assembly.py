@@ -8,7 +8,7 @@ from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import Matrix, ReadOnlyMatrix, ReadOnlyVector, Stack, Vector, helper
 from contin.linalg.blocks import Blocks, Layout, Share
 from contin.linalg.elimination import Range
-from contin.linalg.vector import address, scale_into
+from contin.linalg.vector import Rows, address, combine, spread
 from contin.text import shown
 
 
@@ -19,13 +19,8 @@ def at_points(value: Matrix, x: ReadOnlyVector, points: Matrix) -> None:
     count, n = points.shape
     for j in range(count // d):
         for i in range(d):
-            row = points[j * d + i]
-            for a in range(n):
-                row[a] = 0.0
-            for node in range(d + 1):
-                factor, start = value[i, node], (j * d + node) * n
-                for a in range(n):
-                    row[a] += factor * x[start + a]
+            row = address(points, 8 * (j * d + i) * n)
+            combine(row, address(value, 8 * i * (d + 1)), Rows(address(x, 8 * j * d * n), 8 * n), n, d + 1)
 
 
 @kernel
@@ -89,12 +84,10 @@ def collocate(
     for j in range(h.size):
         for i in range(d):
             values, start = field[j * d + i], (j * d + i) * n
+            nodes = Rows(address(x, 8 * j * d * n), 8 * n)
+            combine(address(residual, 8 * start), address(slope, 8 * i * (d + 1)), nodes, n, d + 1)
             for a in range(n):
-                residual[start + a] = -h[j] * values[a]
-            for node in range(d + 1):
-                factor, first = slope[i, node], (j * d + node) * n
-                for a in range(n):
-                    residual[start + a] += factor * x[first + a]
+                residual[start + a] -= h[j] * values[a]
             for q in range(integrals):
                 last[q] += weights[i] * h[j] * values[n + q]
     for q in range(conditions):
@@ -147,33 +140,29 @@ def _fill_collocation(
     for j in range(part.first, part.last):
         for g in range(groups):
             first, last = offsets[g], offsets[g + 1]
-            for place in range(d * first, d * last):
-                row, equation = local[j, place], layout.rows[place]
-                i, a = equation // n, equation % n
-                point = jacobian[j * d + i, a]
-                target, source = address(row, 0), address(point, 0)
-                if i == d - 1:  # the row remains, and all of its ends are read
-                    for b in range(inner, rest):
-                        row[b] = 0.0
-                for f in range(g + 1):
-                    low, number = offsets[f], offsets[f + 1] - offsets[f]
-                    if follows[f * groups + g] == 1:
-                        for node in range(d + 1):
-                            scale_into(target + 8 * starts[f, node], -h[j] * value[i, node], source + 8 * low, number)
-                    else:
-                        for b in range(number):
-                            row[starts[f, 0] + b] = row[starts[f, d] + b] = 0.0
-                if follows[g * groups + g] == 0:
-                    for node in range(1, d):
-                        for b in range(last - first):
-                            row[starts[g, node] + b] = 0.0
-                own = (place - d * first) % (last - first)
-                for node in range(d + 1):
-                    row[starts[g, node] + own] += slope[i, node]
-                for b in range(k):
-                    row[rest + b] = -h[j] * point[n + b]
-                for b in range(c):
-                    row[rest + k + b] = columns[b, j * d * n + equation]
+            for i in range(d):
+                start, factors = d * first + i * (last - first), address(value, 8 * i * (d + 1))
+                for own in range(last - first):
+                    row, a = local[j, start + own], layout.order[first + own]
+                    point = jacobian[j * d + i, a]
+                    target, source = address(row, 0), address(point, 0)
+                    if i == d - 1:  # the row remains, and all of its ends are read
+                        for b in range(inner, rest):
+                            row[b] = 0.0
+                    for f in range(g + 1):
+                        low, number = offsets[f], offsets[f + 1] - offsets[f]
+                        if follows[f * groups + g] == 1:
+                            spread(target, address(starts, 8 * f * (d + 1)), factors, -h[j], source + 8 * low, number, d + 1)
+                        else:
+                            for node in range(0, d + 1, 1 if f == g else d):
+                                for b in range(number):
+                                    row[starts[f, node] + b] = 0.0
+                    for node in range(d + 1):
+                        row[starts[g, node] + own] += slope[i, node]
+                    for b in range(k):
+                        row[rest + b] = -h[j] * point[n + b]
+                    for b in range(c):
+                        row[rest + k + b] = columns[b, (j * d + i) * n + a]
 
 
 @helper(inline=True)
@@ -224,8 +213,7 @@ def _add_integrals(n: int, weights: Vector, h: Vector, jacobian: Stack, corner: 
 def _fill_rows(layout: Layout, rows: Matrix, part: Range, border: Stack) -> None:
     """Fill the share of some intervals in the extra rows: nodes without the right end, which only the last interval has."""
     n, inner, intervals = layout.order.size, layout.inside.size, border.shape[0]
-    d = inner // n + 1
-    integrals = border.shape[1] - rows.shape[0]
+    d, integrals = inner // n + 1, border.shape[1] - rows.shape[0]
     for j in range(part.first, part.last):
         for q in range(rows.shape[0]):
             target, source = border[j, integrals + q], rows[q, j * d * n :]

@@ -244,12 +244,32 @@ def copy_rows(builder: Builder, target: Rows, source: Rows, length: int, rows: i
 
 
 @instruction
-def scale_into(builder: Builder, target: int, factor: float, source: int, length: int) -> None:
-    """target[:length] = factor * source[:length], for two addresses."""
+def spread(builder: Builder, target: int, places: int, values: int, scale: float, source: int, length: int, count: int) -> None:
+    """target[places[k] :][:length] = scale * values[k] * source[:length] for k < ``count``; all others are addresses."""
 
     def tile(offset: Value, width: int) -> None:
-        values = _load(builder, builder.add(source, offset), width)
-        _store(builder, builder.fmul(_splat(builder, factor, width), values), builder.add(target, offset))
+        row, first = _load(builder, builder.add(source, offset), width), builder.add(target, offset)
+        row = builder.fmul(_splat(builder, scale, width), row)
+        with for_range(builder, count) as loop:
+            at = builder.mul(loop.index, _number(8))
+            place = builder.load(builder.inttoptr(builder.add(places, at), whole().as_pointer()))
+            value = _splat(builder, _load(builder, builder.add(values, at)), width)
+            _store(builder, builder.fmul(value, row), builder.add(first, builder.mul(place, _number(8))))
+
+    _for_tiles(builder, length, tile)
+
+
+@instruction
+def combine(builder: Builder, target: int, factors: int, rows: Rows, length: int, count: int) -> None:
+    """target[:length] = sum over k < ``count`` of factors[k] * rows[k, :length], for two addresses."""
+
+    def tile(offset: Value, width: int) -> None:
+        total = variable(builder, constant(llvm().VectorType(double(), width), [0.0] * width))
+        with for_range(builder, count) as loop:
+            factor = _load(builder, builder.add(factors, builder.mul(loop.index, _number(8))))
+            row = _load(builder, builder.add(_below(builder, rows, loop.index).address, offset), width)
+            builder.store(_plus(builder, builder.load(total), factor, row), total)
+        _store(builder, builder.load(total), builder.add(target, offset))
 
     _for_tiles(builder, length, tile)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contin.kernels.kernel import kernel
-from contin.kernels.kernel_parts import Matrix, Stack, Vector
+from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector
 from contin.linalg import vector
 from contin.linalg.vector import LANES, PANEL, at
 
@@ -155,17 +155,36 @@ def test_copy_rows(width):
 
 
 @kernel
-def scale_into(target: Vector, factor: float, source: Vector, length: int) -> None:
-    vector.scale_into(target.ctypes.data + 16, factor, source.ctypes.data + 8, length)
+def spread(target: Vector, places: IndexVector, values: Vector, scale: float, source: Vector, length: int) -> None:
+    vector.spread(
+        target.ctypes.data + 16, places.ctypes.data, values.ctypes.data, scale, source.ctypes.data + 8, length, places.size
+    )
 
 
 @pytest.mark.parametrize("length", LENGTHS)
-def test_scale_into(length):
-    target, source = numbers(LENGTHS[-1] + 4), numbers(LENGTHS[-1] + 3, seed=1)
+def test_spread(length):
+    places, values = np.array([length + 1, 0, 2 * length + 5]), numbers(3, seed=2)
+    target, source = numbers(3 * LENGTHS[-1] + 8), numbers(LENGTHS[-1] + 3, seed=1)
     found, known = target.copy(), target.copy()
-    scale_into(found, -1.7, source, length)
-    known[2 : 2 + length] = -1.7 * source[1 : 1 + length]
-    assert np.array_equal(found, known)
+    spread(found, places, values, -1.7, source, length)
+    for place, value in zip(places, values):
+        known[2 + place : 2 + place + length] = value * -1.7 * source[1 : 1 + length]
+    assert found == pytest.approx(known, rel=1e-14)
+
+
+@kernel
+def combine(target: Vector, factors: Vector, rows: Matrix, length: int, count: int) -> None:
+    vector.combine(target.ctypes.data + 16, factors.ctypes.data + 8, at(rows, 1, 2), length, count)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_combine(width):
+    target, factors, rows = numbers(width + 4), numbers(9, seed=2), numbers(9, width + 3, seed=1)
+    for length, count in itertools.product([each for each in LENGTHS if each <= width], range(7)):
+        found, known = target.copy(), target.copy()
+        combine(found, factors, rows, length, count)
+        known[2 : 2 + length] = factors[1 : 1 + count] @ rows[1 : 1 + count, 2 : 2 + length]
+        assert found == pytest.approx(known, rel=1e-14, abs=1e-14)
 
 
 # --- substitution: vectors begin at entry 1 of longer ones ------------------------------------------------------------
@@ -313,5 +332,5 @@ def test_every_instruction_has_a_kernel_here():
     """Of the same name; one kernel applies all four triangles."""
     decorated = {name for name, value in vars(vector).items() if hasattr(value, "__wrapped__")}
     instructions = {name for name in decorated if getattr(vector, name).__module__ == vector.__name__}
-    assert len(instructions) == 24
+    assert len(instructions) == 25
     assert {re.sub("apply_.*", "apply_triangle", name) for name in instructions} <= globals().keys()
