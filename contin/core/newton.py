@@ -125,7 +125,8 @@ def correct(
             if done is not None:
                 return done
     done = None if work is None else _in_one_call(system, work, guess, row, target, newton, linearize)
-    return _newton(system, guess, row, target, newton, sizes) if done is None else done
+    stays = linearize and getattr(system, "on_curve", False)
+    return _newton(system, guess, row, target, newton, sizes, stays) if done is None else done
 
 
 def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
@@ -167,9 +168,12 @@ def _in_one_call(
 
 
 def _newton(
-    system: Equations, guess: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes | None
+    system: Equations, guess: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes | None, stays: bool
 ) -> Corrected:
-    """Newton's method with a new Jacobian where chord steps are not expected to do."""
+    """Newton's method with a new Jacobian where chord steps are not expected to do.
+
+    It ``stays`` where the last update, within the tolerance, was taken: what defining systems are made of is known there.
+    """
     rows = () if row is None else (row,)
     x, updates, before, moved = guess.copy(), list[float](), math.inf, 1.0
     factors: Factors | None = None
@@ -181,6 +185,7 @@ def _newton(
             else:
                 residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+            last, x = x, x.copy()
             size = subtract(x, update)
             said, error, moved = judge_update(size, before, moved, number, fresh, newton.tolerance)
             updates += [size] if math.isfinite(size) else []
@@ -193,6 +198,8 @@ def _newton(
                     update = _update(system, x, now, row, target)
                     said = CONVERGED if _strays(system, x, now, row, target, update).any() else FRESH
             if said == CONVERGED or (said == STAGNATES and _is_noise(system, x, update, rows, LOCATED)):
+                if stays and size <= newton.tolerance:
+                    return Corrected(last, factors, number, size)
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(error / (size or 1.0), min(1.0, relative)) <= newton.tolerance:
                     return Corrected(x, factors, number, error)

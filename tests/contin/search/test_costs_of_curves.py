@@ -8,6 +8,7 @@ import pytest
 from bank.gelfand import perturbed_gelfand
 from contin import AlgebraicProblem, CycleProblem, curve, cycle, solve, trace
 from contin.core.differences import of_function
+from contin.core.newton import Newton, correct
 from contin.defining.special_points import FoldCurve
 
 
@@ -48,6 +49,17 @@ def test_both_ends_of_a_step_are_kept():
     for x in (point.x, other.x, point.x, other.x):
         system.once(computed, x)
     assert len(calls) == 2
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_a_step_ends_where_its_last_update_was_taken(stays):
+    """That is within the tolerance of the curve, and what the equations are made of is known there."""
+    point = cusp().points[2]
+    folds, row = FoldCurve(point.system.base), point.tangent
+    guess, tolerance = point.x + 1e-3 * np.ones(point.x.size), 1e-5
+    done = correct(folds, guess, row, row @ point.x, Newton(tolerance), linearize=stays)
+    assert np.abs(done.x - point.x).max() <= done.error * (1 + np.abs(point.x).max()) <= tolerance * 3
+    assert (done.x.tobytes() in folds._known["computed"]) == stays
 
 
 @functools.cache
