@@ -31,7 +31,7 @@ from contin.events import normal_forms
 from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.normal_forms import Coefficient
 from contin.levels import APART, LOCATED
-from contin.linalg.border import orthonormal, rows_fit
+from contin.linalg.border import last_units, orthonormal, rows_fit
 from contin.text import value_names
 
 
@@ -124,14 +124,13 @@ class Stationarity:
 
     def __init__(self, system: System, x: Array, column: str, held: Sequence[int] = (), phi: Array | None = None) -> None:
         count = system.size - system.equations - len(held)
-        if phi is None:
-            phi = generator("extrema").standard_normal((count, system.size))
+        phi = generator("extrema").standard_normal((count, system.size)) if phi is None else phi
         rows = np.zeros((len(held) + count, system.size))
         rows[np.arange(len(held)), list(held)] = 1.0
         rows[len(held) :] = phi
         self._system, self._x, self._column = system, x, column
         self.residual, self.factors = system.linearize(x, rows)
-        self.solutions = self.factors.solve(np.eye(len(rows), system.size, system.equations))
+        self.solutions = self.factors.solve(last_units(system.size, len(rows)))
         self.kernel: Array = self.solutions[len(held) :]
         gradient = system.column_gradient(x, column)
         if gradient is None:

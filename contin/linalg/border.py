@@ -84,7 +84,7 @@ class Bordered:
     @functools.cached_property
     def solutions(self) -> Array:
         """Those for the unit vectors of all rows besides A, shape (held + rows, unknowns + columns)."""
-        return np.asarray(self.factors.solve(_units(self._shape[1] + self._columns, self._held + self._rows)))
+        return np.asarray(self.factors.solve(last_units(self._shape[1] + self._columns, self._held + self._rows)))
 
     @property
     def right(self) -> Array:
@@ -99,7 +99,7 @@ class Bordered:
     @functools.cached_property
     def transposed(self) -> Array:
         """w and what belongs to the other rows, shape (columns, all equations)."""
-        return np.asarray(self.factors.solve_transposed(_units(self._shape[1] + self._columns, self._columns)))
+        return np.asarray(self.factors.solve_transposed(last_units(self._shape[1] + self._columns, self._columns)))
 
     @property
     def left(self) -> Array:
@@ -108,7 +108,7 @@ class Bordered:
 
 
 @functools.lru_cache(maxsize=8)
-def _units(size: int, count: int) -> Array:
+def last_units(size: int, count: int) -> Array:
     """Return the last unit vectors as rows: not to be written to."""
     units = np.eye(count, size, size - count)
     units.flags.writeable = False
@@ -130,12 +130,13 @@ def null_vectors(
     if borders is None:
         random = generator("border")
         borders = random.standard_normal(shape[0]), random.standard_normal(shape[1])
-    found, root = bordered(*borders), np.sqrt(weights)
+    found = bordered(*borders)
     for _ in range(_ROUNDS):
-        left, right = single(found)
-        if not min(cosine(borders[0], left), cosine(borders[1] / root, right * root)) < FITS:
+        (b, c), (left, right) = borders, single(found)  # their products are one
+        lengths = (b @ b) * np.vdot(left, left).real, (c / weights @ c) * np.vdot(right * weights, right).real
+        if not 1 < FITS**2 * max(lengths) < math.inf:
             break
-        borders = _largest_part(left), _largest_part(right * root) * root
+        borders = _largest_part(left), _largest_part(right * np.sqrt(weights)) * np.sqrt(weights)
         found = bordered(*borders)
     return found, borders
 
