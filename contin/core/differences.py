@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Indices
 
 #: First length, by order of the derivative: the fifth, sixth and seventh root of round-off, where the errors of a fourth-order
 #: difference and of round-off are equal for functions that bend on the scale of one. With a ten times larger one the first
@@ -101,8 +101,12 @@ def _differences(function: Callable[[float], Any], middle: Array, order: int, h:
 Numbers = tuple[int, ...]
 
 
-#: Those of the imaginary unit.
-_POWERS = np.array([1, 1j, -1, -1j])
+@functools.cache
+def _combined(counts: Numbers) -> tuple[Indices, Any]:
+    """Return the parts of vectors that are combined, 1 for an imaginary one, and the powers of i that belong to them."""
+    chosen = np.indices(counts).reshape(len(counts), -1)
+    powers = np.array([1, 1j, -1, -1j])[chosen.sum(axis=0) % 4]
+    return chosen, powers if chosen.any() else powers.real
 
 
 def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any]) -> Any:
@@ -116,9 +120,8 @@ def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any])
     (5+5j)
     """
     parts = [np.array([vector.real, vector.imag] if vector.dtype.kind == "c" else [vector]) for vector in vectors]
-    chosen = np.indices([len(part) for part in parts]).reshape(len(parts), -1)  # 1 where the imaginary part is
+    chosen, factors = _combined(tuple(map(len, parts)))
     values = form([part[each] for part, each in zip(parts, chosen)])
-    factors = (_POWERS if chosen.any() else _POWERS.real)[chosen.sum(axis=0) % 4]
     return (factors @ values.reshape(len(factors), -1)).reshape(values.shape[1:])
 
 

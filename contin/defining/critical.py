@@ -124,13 +124,11 @@ class CriticalCurve(Defining):
         """Return dg/dx."""
         (right, left), base = self.null_vectors(x), self.base
         form, result = self.at(x)[0].reduced, np.zeros((self.own_equations, self.size))
-        for copy, v in enumerate(right):
-            wide = np.zeros(base.size)
-            wide[form.places] = v
-            for i, copies in enumerate(left):
-                w = np.zeros(base.equations)
-                w[: form.equations] = copies[copy]
-                result[i, : base.size] -= base.bent(self.inside(x), w, wide)
+        vs, ws = np.zeros((len(right), base.size)), np.zeros((*left.shape[:2], base.equations))
+        vs[:, form.places], ws[..., : form.equations] = right, left
+        for row, copies in zip(result, ws):
+            for v, w in zip(vs, copies):
+                row[: base.size] -= base.bent(self.inside(x), w, v)
         if self.own_unknowns:
             changed, coupled = self.coupling_slope(self.kappa(x)) @ right, self.coupling(self.kappa(x)) @ right
             for row, copies in zip(result, left):
