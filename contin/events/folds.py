@@ -173,9 +173,9 @@ def may_turn(arc: Arc, fold: Event) -> bool:
     It may, too, where its sense cannot be told at the beginning, or is not that in which it went before. Where it stands still
     at the end, as far as can be told, no fold is seen.
     """
-    ends = senses(arc, fold)
-    if not ends[1]:
+    if not sense(arc.trial, fold, arc.newton):
         return False
+    ends = senses(arc, fold)
     if not ends[0] * ends[1] > 0 or arc.state.sense * ends[1] < 0:
         return True
     search = FoldSearch(arc, fold, lambda: None)
