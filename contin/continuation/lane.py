@@ -181,13 +181,14 @@ class MeshLane(Lane):
         super().__init__(system, *given)
         settings, newton, n = self.settings, self.settings.newton, system.states_count
         autonomous = system.size_of_solutions is not None
-        self._work, self._factors = system.workspace, [system.unfilled_factors(), system.unfilled_factors()]
+        self._work, first = system.workspace, system.unfilled_factors()
+        self._factors: list[Factorization | None] = [first, None]
         rooms = on_mesh.MeshRooms(
-            self._work, self._factors[0].room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
+            self._work, first.room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
             np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
             self._frame, self._attempt, self._control, self._watch,
         )  # fmt: skip
-        self._rooms = [rooms, rooms._replace(factored=self._factors[1].room)]
+        self._rooms = [rooms, rooms]
         self._still = max((test.still for test in given[2]), default=0.0)
         may_grow = settings.mesh.every and system.intervals < settings.mesh.max_intervals
         self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
@@ -218,7 +219,7 @@ class MeshLane(Lane):
         error = path.numbers[1, rules.MESH_ERROR]
         poor = _NO_WORSE * error if error > self._poor else self._poor
         for number in range(2, len(path.x)):
-            now, after = 1 - now, self._factors[1 - now]
+            now, after = 1 - now, self._spare(1 - now)
             step = on_mesh.step_on_mesh(self._rooms[now], path, accepted, number)
             asks = step <= 0 or (self._still and on_mesh.rests(values.field, values.points.shape[1], self._still))
             if not asks:
@@ -252,7 +253,7 @@ class MeshLane(Lane):
 
         It is what the steps of the call before have left, where they end there.
         """
-        _, factored, newton, report, amplitude, frame, *_ = self._rooms[0]
+        _, _, newton, report, amplitude, frame, *_ = self._rooms[0]
         values, (left, self._left) = self._work.values, (self._left, None)
         self.system.fill_conditions(values)
         values.rows[-1] = frame.weights * path.tangents[1]
@@ -263,10 +264,10 @@ class MeshLane(Lane):
         factors = here.factors
         known = isinstance(factors, Factorization) and (self._monodromy is None or np.array_equal(values.at, here.x))
         if not known:
+            factors = self._spare(0)
             given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
-            if one_call.correct_on_mesh(self._work, factored, *given) != one_call.CONVERGED:
+            if one_call.correct_on_mesh(self._work, factors.room, *given) != one_call.CONVERGED:
                 return None
-            factors = self._factors[0]
         self._compared(factors.room, 1)
         room = self._monodromy
         asks = room is not None and self._multipliers_ask(path, 1, 0.0, 0.0) == on_mesh.ASK
@@ -293,7 +294,7 @@ class MeshLane(Lane):
         return changes_little(before, after, self.system.size) if clear == on_mesh.TURNS else clear == on_mesh.CALM
 
     def _hand_over(self, path: rules.Path, number: int, step: float, both: tuple[Factorization, Factorization]) -> None:
-        """Keep a step that was made and asks for a closer look, with the factors at both ends: the lane takes others."""
+        """Keep a step that was made and asks for a closer look, with the factors at both ends, which the lane gives away."""
         sign, iterations, error = self._attempt.judged[[rules.SIGN, rules.UPDATES, rules.ERROR]].tolist()
         both[0].sign, both[1].sign = float(path.numbers[number - 1, rules.SIGN_OF]), sign
         first, last = (
@@ -302,9 +303,17 @@ class MeshLane(Lane):
         )
         begin = Trial(self.system, path.x[number - 1].copy(), first)
         end = Trial(self.system, path.x[number].copy(), last, int(iterations), error)
+        end._discretization_error = float(path.numbers[number, rules.MESH_ERROR]) or None  # 0 where it is not known yet
         self._handed = step, begin, (end, rules.judgement_of(self._attempt, path, number, BELIEVED))
-        self._factors = [self.system.unfilled_factors() for _ in range(2)]
-        self._rooms = [rooms._replace(factored=factors.room) for rooms, factors in zip(self._rooms, self._factors)]
+        self._factors = [None if each in both else each for each in self._factors]
+
+    def _spare(self, place: int) -> Factorization:
+        """Return the factors of a place, new ones where the last ones were handed over: often the mesh changes before."""
+        factors = self._factors[place]
+        if factors is None:
+            factors = self._factors[place] = self.system.unfilled_factors()
+            self._rooms[place] = self._rooms[place]._replace(factored=factors.room)
+        return factors
 
 
 class Lanes:
