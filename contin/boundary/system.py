@@ -693,16 +693,16 @@ class Collocation(Composed):
         return {}
 
     def _made_workspace(self, thread: int) -> Workspace | None:
-        own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
+        own = self.linear_conditions
+        recorded = thread in self._codes or all(batch.interpreted is None for batch in self._evaluated)
         if own is None or not recorded or self._components or self.outcomes.size or self.size < self.equations:
             return None
         rows = len(own[0]) + self.size - self.equations
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
         if is_large(numbers):
             return None
-        if thread not in self._codes:
-            self._codes[thread] = codes_of(self)
-        return workspace(self, self._codes[thread], rows)
+        codes = self._codes[thread] = self._codes.get(thread) or codes_of(self)
+        return workspace(self, codes, rows)
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""

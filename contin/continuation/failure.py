@@ -195,8 +195,9 @@ def limit_neared(state: State, settings: Settings, start: Discretization) -> str
     system, now, then = state.system, state.system.solution.scales, start.solution.scales
     if now is not then and (now.states / then.states).max(initial=0.0) > 1 / DOUBLED:
         return ""
-    for name, size, rate in zip(system.free, system.free_scales, state.tangent[system.state_size :]):
-        value = system.parameter(state.x, name)
+    values, rates = (vector[system.state_size :].tolist() for vector in (state.x, state.tangent))
+    for name, size, value, rate in zip(system.free, system.free_scales.tolist(), values, rates):
+        value *= size
         for limit in settings.limits.get(name, ()):
             if 0 < abs(limit - value) < (abs(limit) or size) / _FAR and (limit - value) * rate > 0:
                 return f"{name} = {exact_text(limit)}"
