@@ -58,7 +58,6 @@ class Piece(Chain):
 
     @property
     def segment(self) -> float:
-        """Length of a segment."""
         return self.length / len(self.strains)
 
     @property

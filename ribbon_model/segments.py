@@ -196,7 +196,6 @@ class Strip(Chain):
 
     @property
     def segment(self) -> float:
-        """Length of a segment."""
         return LENGTH / len(self.strains)
 
     @property

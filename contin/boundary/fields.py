@@ -65,7 +65,6 @@ class FieldForm(DenseForm):
         self.equations, self.weights = system.equations, system.weights[self.places]
 
     def solver(self, coupling: complex | Numbers, border: Borders | None = None) -> Any:
-        """Return LU factors of L(P)."""
         from scipy.sparse import block_array, csc_array, kron  # type: ignore[import-untyped]  # .1 s
 
         small = np.atleast_2d(coupling)

@@ -162,7 +162,6 @@ class Collocation(Composed):
         return np.append((self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel(), self.mesh[-1])
 
     def states(self, x: Array) -> Array:
-        """Return the states at the nodes, shape (N d + 1, n)."""
         return self._scaled_states(x) * self.scales.states
 
     def at_gauss_points(self, x: Array) -> Array:
@@ -636,7 +635,6 @@ class Collocation(Composed):
         return self.defect.error(x, factors, columns)
 
     def newton_error(self, x: Array, factors: Factors) -> float:
-        """Return what Newton's method or round-off has left, measured in the same way."""
         return self.defect.left_by_newton(x, self.residual(x), factors)
 
     def field_values(self, times: Array, points: Array, p: Array) -> Array:

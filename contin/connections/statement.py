@@ -120,7 +120,6 @@ class ConnectionProblem(BoundaryValueProblem):
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
         degree: int = 0,
     ) -> ConnectionCollocation:  # fmt: skip
-        """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
         return ConnectionCollocation(self, mesh, degree, free, parameters, scales)
 
     def _groups(self) -> list[str]:

@@ -295,7 +295,6 @@ class System(Discretization):
         return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
 
     def parameter_index(self, name: str) -> int:
-        """Return the place of the free parameter ``name`` in x."""
         return self.state_size + self.free.index(name)
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
@@ -556,7 +555,6 @@ class Composed(System):
         return other, other.pack(self.states(x), values)
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Self, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         rows = {name: np.ones(count) for name, count in self._rows}
         scaled = self._with(scales=Scales(states, parameters, rows))
         z = self.carrier(scaled)(x)

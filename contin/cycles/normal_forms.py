@@ -327,7 +327,6 @@ class CycleForm(RoundForm):
         return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)
 
     def product(self, left: Numbers, values: Numbers) -> complex:
-        """Return w.values."""
         return complex(left[: values.size] @ (self._widths * values).ravel())
 
     def along_time(self, states: Numbers) -> Any:

@@ -566,7 +566,6 @@ class MapProblem(AlgebraicProblem):
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
         degree: int = 0,
     ) -> MapSystem:  # fmt: skip
-        """Return F(x) = 0 with these free parameters and sizes; there is no mesh."""
         return MapSystem(self, free, parameters, scales)
 
     def _check_angles(self) -> None:

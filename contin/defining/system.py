@@ -240,7 +240,6 @@ class Defining(Discretization):
     )
 
     def parameter_index(self, name: str) -> int:
-        """Return the place of the free parameter ``name`` in x."""
         return self.base.parameter_index(name)
 
     def column_gradient(self, x: Array, name: str) -> Array | None:

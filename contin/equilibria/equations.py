@@ -203,7 +203,6 @@ class Algebraic(Spectral, Composed):
         return moved
 
     def residual(self, x: Array) -> Array:
-        """Return F at x, shape (equations,)."""
         return self._terms[0].values(x)
 
     _functions = ("residual",)
@@ -298,11 +297,9 @@ class Algebraic(Spectral, Composed):
         )
 
     def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
         return self._jacobian(x)[1].T @ w
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (equations,)."""
         return self.stack_along(x, [v[None] for v in directions])[0]
 
     def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
@@ -355,7 +352,6 @@ class Algebraic(Spectral, Composed):
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
     def spectra(self, places: Sequence[Array]) -> list[Eigenvalues]:
-        """Return the eigenvalues at places."""
         if self.is_sparse:
             return [Eigenvalues(rightmost(self.as_field().field_jacobian(x), self.problem.solver)) for x in places]
         matrices = np.array([self.jacobian(x) for x in places])

@@ -209,14 +209,12 @@ class BranchPoint(Finding):
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What is stored, by name."""
         return {
             "kernel": self.kernel, "left": self.left, "hessian": self.hessian, "tangents": np.array(self.tangents),
         }  # fmt: skip
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What is stored besides."""
         return {"imperfection": self.imperfection}
 
     def __repr__(self) -> str:

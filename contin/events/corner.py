@@ -66,12 +66,10 @@ class Corner(Finding):
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What is stored, by name."""
         return {"tangents": np.array(self.ways)}
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What is stored besides."""
         return {"corner": self.kind, "unstable": self.unstable}
 
 

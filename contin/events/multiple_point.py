@@ -112,12 +112,10 @@ class MultiplePoint(Finding):
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What is stored, by name."""
         return {"kernel": self.kernel, "tangents": np.array(self.tangents)}
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What is stored besides."""
         return {"dimension": self.dimension, "continuum": self.continuum, "spread": self.spread}
 
     def __repr__(self) -> str:

@@ -248,11 +248,9 @@ class DenseForm(Form):
         return Direction(self.solver(np.asarray(coupling, np.result_type(coupling, values))).solve(right))
 
     def along(self, *directions: object) -> Any:
-        """Return B or C along real or complex directions."""
         return of_complex(self._along, directions)
 
     def product(self, left: Numbers, values: Numbers) -> complex:
-        """Return w.values."""
         return complex(left @ values)
 
     def normalized(self, left: Numbers, right: Numbers) -> tuple[Any, Direction]:
