@@ -57,8 +57,8 @@ class Settings(checks.Named):
     corners : bool
         Label corners at the knots of tables, too (BC): hundreds may be passed in silence. A fold there is always labelled.
     errors : bool
-        Solve labelled points again on finer meshes, until their errors are below the mesh tolerance: these follow from the last
-        change, the order, and the discretization error.
+        Solve labelled points again on finer meshes, until their errors, which follow from the last changes, are below the mesh
+        tolerance.
     angle : float, optional
         Largest angle between the tangents of consecutive points, radians. By default 0.35, and 0.7 for cycles.
     change : float

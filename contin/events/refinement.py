@@ -58,7 +58,8 @@ class Refined:
     """A special point on the finest mesh that it was located on.
 
     - ``trial`` (Trial)
-    - ``errors`` (dict): Of its free parameters; NaN where it could not be located again.
+    - ``errors`` (dict): By how much its free parameters differ from those on the mesh before; NaN where it could not be located
+      again.
     - ``details`` (object)
     - ``is_lost`` (bool): It was looked for, and is not there. Where Newton's method fails, nothing is known: the point is not
       lost.
@@ -87,15 +88,14 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
     The first finer mesh of one whose error is above that tolerance, as on a path that is less exact, is made for the tolerance.
-    There is none where the solution is exact enough and no function tells the place: a parameter is held, or it is the first.
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, or another kernel) is dropped; if Newton's method fails, it stays, without errors.
-    What is left after two moves follows from the last one by the order that both have, unless it is below the tolerance of
-    Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its error is the larger
-    of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further than on the one
-    before, only the estimate is made: the point stays on the one before.
+    is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
+    and has no errors. What is left after two moves follows from the last one by the order that both have, unless it is below
+    the tolerance of Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its
+    error is the larger of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further
+    than on the one before, only the estimate is made: the point stays on the one before.
     """
-    trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, np.full(1, np.nan)
+    trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
     if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
         return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
@@ -106,7 +106,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     (trial, details, *_), is_lost = now, False
     for number in range(_HALVINGS):
         coarse = trial.system
-        made = None if number or finding_of(details).has_equations else _on_made_mesh(point, now, settings)
+        made = None if number else _on_made_mesh(point, now, settings)
         finer = None if made else coarse.refined()
         try:
             again = made or _again(point, now, finer or (coarse, np.array), settings.newton)
@@ -119,8 +119,10 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         least = LAST_PLACES * size.max()
         steps = moves = np.maximum(np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :]), least)
         if made:
-            bound = _of_the_solution(point, better)
-            steps = np.maximum(bound if system is coarse else np.minimum(moves * _part_left(trial, better), bound), least)
+            steps = moves * _part_left(trial, better)
+            if point.test is not None and point.test.holds_one_of(system.free) and not system.on_curve:
+                steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
+        steps = np.maximum(steps, least)
         moved = float(np.max(steps / size))
         if np.any(steps > _FAR * size):
             is_lost = last == np.inf
@@ -129,7 +131,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if seen and not too_fine:
             part = _part_by_order(*seen, moved, system.degree)
             steps, left = np.maximum(part * steps, np.minimum(steps, settings.newton.tolerance * size)), _SAFE * left
-        if system.intervals > coarse.intervals:
+        if made or finer:
             seen = float(np.max(moves / size)), np.log2(system.intervals / coarse.intervals)
         settled = np.maximum(np.maximum(settings.mesh.tolerance * size, left), least) >= steps
         change = np.maximum(steps, before) if moved > _CLOSER * last else steps
@@ -140,43 +142,32 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if np.all(settled) or moved > _CLOSER * last:
             break
         before, last = steps, moved
-    known = (known + finding_of(details).round_off(trial.system, settings.newton))[: len(errors)] * trial.system.free_scales
-    errors = dict(zip(errors, map(float, _with_cut_off(known, trial, point.test, now.slope, settings))))
-    return Refined(trial, errors, details, is_lost)
+    if known is not None:
+        known = (known + finding_of(details).round_off(trial.system, settings.newton))[: len(errors)]
+        errors = dict(zip(errors, map(float, known * trial.system.free_scales)))
+    return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings), details, is_lost)
 
 
 def _on_made_mesh(point: SpecialPoint, coarse: _Found, settings: Settings) -> _Found | None:
-    """Return a special point on a mesh that is made for the tolerance, its own or one twice as fine; None if not found.
+    """Return a special point on a mesh that is made for the tolerance, of twice as many intervals at least; None if not found.
 
     Interpolation moves a point along the branch: there is none for those whose place no equation holds, and where the halved
     mesh serves as well.
     """
     test, control, trial = point.test, settings.mesh, coarse.trial
-    system, made, n = trial.system, (trial.system, np.array), trial.system.intervals
-    if (test is None and system.on_curve) or not (n and np.isfinite(trial.tangent).all()):
+    system = trial.system
+    if test is None or finding_of(coarse.details).has_equations or not (system.intervals and np.isfinite(trial.tangent).all()):
         return None
-    error = trial.discretization_error
-    switches = system.switching(trial.x).places.size > 0  # a run from a cycle with corners failed on the coarser mesh
-    if switches or not (_SAFE * error <= control.tolerance and np.isfinite(_of_the_solution(point, trial)).all()):
-        if test is None or not (error > control.tolerance and (test.holds_one_of(system.free) or trial.value(test))):
-            return None
-        made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=min(2 * n, control.max_intervals))) or made
-        if made[0].intervals < 2 * n:
-            return None
+    if not (test.holds_one_of(system.free) or trial.value(test)) or not trial.discretization_error > control.tolerance:
+        return None
+    made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=min(2 * system.intervals, control.max_intervals)))
+    if made is None or made[0].intervals < 2 * system.intervals:
+        return None
     with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
         there = _again(point, coarse, made, settings.newton)
         x = there.trial.x[made[0].state_size :]
         return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else None
     return None
-
-
-def _of_the_solution(point: SpecialPoint, trial: Trial) -> Array | float:
-    """Return the errors of free parameters as exact as the solution, 0 of one held; infinity if a function tells the place."""
-    test, system = point.test, trial.system
-    if system.on_curve or not (point.label != Label.BRANCH_POINT if test is None else test.holds_one_of(system.free)):
-        return np.inf
-    is_free = np.array([test is None or name != test.column for name in system.free])
-    return _SAFE * trial.discretization_error * (1 + np.abs(trial.x[system.state_size :])) * is_free
 
 
 def _part_left(coarse: Trial, better: Trial) -> float:
@@ -196,7 +187,9 @@ def _part_by_order(before: float, halvings: float, now: float, degree: int) -> f
     return min(_SAFE * max((now / before) ** (1 / halvings), 0.5 ** (1.5 * degree)), 1.0)
 
 
-def _with_cut_off(errors: Array, trial: Trial, test: Event | None, slope: float, settings: Settings) -> Array:
+def _with_cut_off(
+    errors: dict[str, float], trial: Trial, test: Event | None, slope: float, settings: Settings
+) -> dict[str, float]:
     """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
 
     A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
@@ -206,12 +199,15 @@ def _with_cut_off(errors: Array, trial: Trial, test: Event | None, slope: float,
     moves = system.cut_off_errors(trial.x, trial.factors) if np.isfinite(along).all() else np.empty((0, system.size))
     if not len(moves) or not np.isfinite(moves).all():
         return errors
-    test = test or Event(Label.END, "start", lambda trial: trial[settings.primary or system.free[0]])
+    if test is None:
+        primary = settings.primary or system.free[0]
+        test = Event(Label.END, "start", lambda trial: trial[primary])
     if test.label != Label.FOLD:
         slope = _change(test, trial, along) if np.isnan(slope) else slope
         for move in moves:
             move -= along * (_change(test, trial, move) / slope if move.any() and slope else 0.0)
-    return errors + np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
+    added = np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
+    return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
 
 
 def _change(test: Event, trial: Trial, move: Array) -> float:
@@ -246,10 +242,11 @@ def _again(point: SpecialPoint, coarse: _Found, finer: tuple[Discretization, Car
     Raises ConvergenceError where it was not found, or another one was.
     """
     (system, carry), (trial, details, _, slope) = finer, coarse
-    is_first = details is None and point.label == Label.BRANCH_POINT and point.test is None  # its kernel is not known
-    if is_first or finding_of(details).has_equations:
-        known = finding_of(details)
-        found = locate_branch_point(system, carry(trial.x), newton) if is_first else known.again(system, carry, trial.x, newton)
+    if details is None and point.label == Label.BRANCH_POINT and point.test is None:  # a first point: its kernel is not known
+        found: Any = locate_branch_point(system, carry(trial.x), newton)
+        return _Found(found.there(system, carry(trial.tangent)), found)
+    if finding_of(details).has_equations:
+        found = finding_of(details).again(system, carry, trial.x, newton)
         return _Found(found.there(system, carry(trial.tangent)), found)
     zero, apart, slope = zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton, slope)
     return _Found(zero, details, apart, slope)
@@ -359,9 +356,10 @@ def _bracketed(function: Callable[[float], float], here: Value, beside: Value) -
     """Return a zero of a function between a place and one beside it on either side; None where it keeps its sign."""
     if here[1] * beside[1] > 0:
         beside = -beside[0], function(-beside[0])
-    with contextlib.suppress(ConvergenceError):
+    try:
         return find_zero(function, here, beside, LOCATED) if here[1] * beside[1] < 0 else None
-    return None
+    except ConvergenceError:
+        return None
 
 
 def _stands_still_to(function: Callable[[float], float]) -> float:

@@ -5,11 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from bank import abc, bru
 from bank.case import UNDERRATED
-from bank.closed_forms import bratu, bratu_load, bratu_mean
+from bank.closed_forms import bratu
 from contin import BoundaryValueProblem, ConvergenceError, Settings, solve, trace
 from contin.core.trial import Linearization, Trial
 from contin.events import refinement
@@ -136,13 +135,3 @@ def test_what_is_left_after_two_moves_follows_from_their_order(ratio, part):
     """Degree 6, meshes halved: 8 times the ratio of the moves, which counts down to 2^-9; or all of the last move."""
     assert refinement._part_by_order(1e-7, 1.0, 1e-7 * ratio, 6) == pytest.approx(part)
     assert refinement._part_by_order(1e-7, 2.0, 1e-7 * ratio**2, 6) == pytest.approx(part)  # the first of four times as many
-
-
-def test_a_point_whose_parameter_is_held_stays_on_a_mesh_that_is_exact_enough():
-    """Bratu's problem where lam is small: closed form. A fold, whose place a function tells, has a finer mesh."""
-    start = solve(bratu(), [0, 0])
-    branch = trace(start, free=["lam"], limits={"lam": (-1, 4), "mean": (-1, 3)}, zeros={"lam": [1.0]})
-    point, fold = branch.labelled("UZ")[0], branch.labelled("LP")[0]
-    assert point.system.intervals == start.system.intervals < fold.system.intervals
-    size = brentq(lambda s: bratu_load(s) - 1, 0.1, 1.0, xtol=1e-15)
-    assert abs(point["mean"] - bratu_mean(size)) < 1e-12 and point.errors["lam"] < 1e-14

@@ -45,7 +45,7 @@ def further(point):
 def test_representations_are_short():
     branch = trace(solve(PROBLEM, [0, 0]), free=["lam"], limits={"lam": (0, 1)})
     assert repr(branch.points[0]) == "Point(EP start: lam=0)"
-    assert repr(branch) == f"Branch({len(branch)} points on 8 intervals of degree 7: EP EP; reached lam = 1)"
+    assert repr(branch) == f"Branch({len(branch)} points on 8 to 16 intervals of degree 7: EP EP; reached lam = 1)"
 
 
 def test_a_name_that_is_not_there_is_answered_with_those_that_are():

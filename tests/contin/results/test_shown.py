@@ -44,7 +44,7 @@ def test_a_branch_is_a_sequence(column):
 
 def test_what_is_printed_fits_on_a_screen(column, diagram):
     first, *_ = column.labelled("BP")
-    state = contin.lowlevel.Continuation(column[0].system, column[0].x).state
+    state = contin.lowlevel.Continuation(first.system, column[0].x).state
     long = contin.Branch(column.points * 50, column.stop)
     for found in (column, long, first, first.details, first.system, state, diagram, diagram.branches[0], column.stop):
         lines = repr(found).splitlines()
