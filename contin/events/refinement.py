@@ -89,11 +89,11 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
 
     The first finer mesh of one whose error is above that tolerance, as on a path that is less exact, is made for the tolerance.
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, or another kernel) is dropped; one for which Newton's method fails stays as it is,
-    and has no errors. What is left after two moves follows from the last one by the order that both have, unless it is below
-    the tolerance of Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its
-    error is the larger of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further
-    than on the one before, only the estimate is made: the point stays on the one before.
+    is not the coarse one again (far from it, or another kernel) is dropped; if Newton's method fails, it stays, without errors.
+    What is left after two moves follows from the last one by the order that both have, unless it is below the tolerance of
+    Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its error is the larger
+    of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further than on the one
+    before, only the estimate is made: the point stays on the one before.
     """
     trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
@@ -114,16 +114,14 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
             break
-        system = better.system
-        size = 1 + np.abs(better.x[system.state_size :])
+        system, size = better.system, 1 + np.abs(better.x[better.system.state_size :])
         least = LAST_PLACES * size.max()
         steps = moves = np.maximum(np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :]), least)
         if made:
             steps = moves * _part_left(trial, better)
             if point.test is not None and point.test.holds_one_of(system.free) and not system.on_curve:
                 steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
-        steps = np.maximum(steps, least)
-        moved = float(np.max(steps / size))
+        moved = float(np.max((steps := np.maximum(steps, least)) / size))
         if np.any(steps > _FAR * size):
             is_lost = last == np.inf
             break
