@@ -84,9 +84,10 @@ def finding_of(details: object) -> Finding:
 
 
 def frequency_of(point: Any) -> float | None:
-    """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
-    known = isinstance(point.details, dict) and "frequency" in point.details
-    return float(point.details["frequency"]) if known else None
+    """Return the frequency of a Hopf or torus bifurcation, known without its normal form; None where stored without it."""
+    told = vars(point).get("_told")  # makes the details with the normal form of the point that was located
+    details = point.details if told is None else told.args[0].details
+    return float(details["frequency"]) if isinstance(details, dict) and "frequency" in details else None
 
 
 def contradiction(index: Event | None, arc: Arc, special: Iterable[SpecialPoint]) -> str:
