@@ -1,12 +1,8 @@
 """A user's functions evaluated at many points in one call, with exact derivatives, recorded or in Python.
 
-Users' functions that cannot be recorded, evaluated in Python: values and derivatives in the place of a recording.
-
-A function that takes arrays of places instead of numbers is called once for all of them. Derivatives are differences with an
-estimated error.
-
-The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter.
-What cannot be recorded is evaluated in Python, with a warning. Both answer the same `Request`.
+The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter. What
+cannot be recorded is evaluated in Python, with a warning: a function that takes arrays of places is called once for all of
+them, and derivatives are differences with an estimated error. Both answer the same `Request`.
 """
 
 from __future__ import annotations
@@ -14,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import functools
+import operator
 import time
 import warnings
 from collections.abc import Callable, Hashable, Sequence
@@ -30,8 +27,9 @@ from contin.functions import derivatives, round_off
 from contin.functions.interpreter import LANES, Loaded, load, run
 from contin.functions.outcomes import Outcomes, frozen
 from contin.functions.program import Inputs, Program, Slope, program
-from contin.functions.recording import Recording, checked, record, sized
+from contin.functions.recording import Recording, checked, sized
 from contin.functions.signature import ABSENT, Signature, UserFunction
+from contin.functions.stand_ins import constants_of
 from contin.functions.tape import Number, Unrecordable
 from contin.threads import PARTS
 
@@ -65,6 +63,7 @@ class Recorded:
         self.recording = checked(functions, signature)
         self.kept: dict[Hashable, Any] = {}
         self._functions, self._signature = functions, signature
+        self._constants = constants_of(each.function for each in functions)
         self._seconds: dict[int, float] = {}  # a point takes, by the number of instructions
         self._values, self._sides = len(self.recording.results), 0  # numbers of values that have sizes, and of frozen outcomes
         self._behind: Array = np.empty(0)  # p: frozen outcomes, and sizes that inputs and values are divided by
@@ -102,7 +101,10 @@ class Recorded:
     def is_current(self) -> bool:
         """Return whether all constants that the functions read still have the values that were recorded."""
         try:
-            return self.recording.same(record(self._functions, self._signature))
+            known, now = self._constants, constants_of(each.function for each in self._functions)
+            if known is not None and now is not None and len(now) == len(known) and all(map(operator.is_, now, known)):
+                return True
+            return self.recording.is_same(self._functions, self._signature)
         except Unrecordable:
             return False
 
@@ -119,7 +121,8 @@ class Recorded:
 
     def bends(self, inputs: tuple[int, ...]) -> bool:
         """Return whether derivatives by these inputs may change."""
-        return bool(self._once(("bends", inputs), lambda: self._weighted_slopes(inputs)))
+        tape, every = self.recording.tape, set(self.recording.inputs)
+        return bool(self._once(("bends", inputs), lambda: not every.isdisjoint(tape.needed(self._slopes(inputs).values()))))
 
     def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian that may differ from zero."""
@@ -304,10 +307,6 @@ class Interpreted:
         found = copy.copy(self)
         found._sizes = inputs, values
         return found
-
-    def is_current(self) -> bool:
-        """Return whether constants are those that the functions read: they are read at each call."""
-        return True
 
     def describe(self) -> str:
         """Return one line: why the functions are evaluated in Python."""
@@ -602,8 +601,8 @@ class Batch:
         return made
 
     def is_current(self) -> bool:
-        """Return whether all constants that the functions read still have the values that were recorded."""
-        return self._own.is_current()
+        """Return whether all constants that the functions read still have the values that were recorded, if they were."""
+        return self.recorded is None or self.recorded.is_current()
 
     def describe(self) -> str:
         """Return one line: how the functions are evaluated, and how many operations they have."""
@@ -709,23 +708,8 @@ class Piecewise:
     def bends(self, columns: Columns) -> bool:
         return any(batch.bends(columns) for batch in self.batches)
 
-    def values(self, *given: Any) -> Array:
+    def _each(self, name: str, *given: Any) -> Any:
         """Return values at all points; the others, as of a `Batch`, likewise."""
-        return np.concatenate(self._each("values", given))
-
-    def jacobian(self, *given: Any) -> Any:
-        return [np.concatenate(parts) for parts in zip(*self._each("jacobian", given))]
-
-    def entries(self, *given: Any) -> Any:
-        return [np.concatenate(parts) for parts in zip(*self._each("entries", given))]
-
-    def along(self, *given: Any) -> Array:
-        return np.concatenate(self._each("along", given))
-
-    def bent(self, *given: Any) -> Array:
-        return np.concatenate(self._each("bent", given))
-
-    def _each(self, name: str, given: Any) -> list[Any]:
         t, u, v, p, *rest = given
 
         def at(item: Any, piece: slice) -> Any:
@@ -733,10 +717,15 @@ class Piecewise:
                 return [at(each, piece) for each in item]
             return item[piece] if isinstance(item, np.ndarray) else item
 
-        return [
+        found = [
             getattr(batch, name)(t[piece], u[piece], v, p, *(at(item, piece) for item in rest))
             for batch, piece in zip(self.batches, self._pieces)
         ]
+        return np.concatenate(found) if isinstance(found[0], np.ndarray) else [np.concatenate(parts) for parts in zip(*found)]
+
+    values, along, bent, jacobian, entries = map(
+        functools.partial(functools.partialmethod, _each), ("values", "along", "bent", "jacobian", "entries")
+    )
 
 
 #: The values.

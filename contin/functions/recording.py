@@ -55,11 +55,10 @@ class Recording:
     time: int
     inputs: tuple[int, ...]
 
-    def same(self, other: Recording) -> bool:
-        """Return whether two recordings have the same operations."""
-        if self.results != other.results or len(self.tape.operations) < len(other.tape.operations):
-            return False
-        return self.tape.operations[: len(other.tape.operations)] == other.tape.operations
+    def is_same(self, functions: Sequence[UserFunction], signature: Signature) -> bool:
+        """Return whether functions are recorded alike once more: on the tape, where equal operations are stored once."""
+        self.tape.searches = 0
+        return record(functions, signature, self.tape).results == self.results
 
 
 def sized(recording: Recording) -> Recording:
@@ -78,7 +77,7 @@ def sized(recording: Recording) -> Recording:
 
 
 def record(functions: Sequence[UserFunction], signature: Signature, tape: Tape | None = None) -> Recording:
-    """Return the recording of functions, on a new tape or on an empty one; raise Unrecordable where that fails."""
+    """Return the recording of functions, on a new tape or on a given one; raise Unrecordable where that fails."""
     tape = tape or Tape(NUMPY)
     time = tape.input(TIME)
     inputs = [tape.input(slot) for slot in range(signature.inputs)]
@@ -99,7 +98,7 @@ def _given(signature: Signature, time: object, inputs: Sequence[Any]) -> list[An
 def checked(functions: Sequence[UserFunction], signature: Signature) -> Recording:
     """Return the recording, made twice and compared with values in Python; raise Unrecordable where that fails."""
     found = record(functions, signature)
-    if not record(functions, signature).same(found):
+    if not found.is_same(functions, signature):
         raise Unrecordable("it is not the same when it is called again")
     row = 0
     for function in functions:

@@ -1,7 +1,5 @@
 """Copies of users' functions that take recorded numbers, and functions that stand for a recording.
 
-Stand-ins: copies of a user's function, and of what it calls, that take recorded numbers.
-
 Functions of ``math`` take ordinary numbers only, and arrays that NumPy makes hold no recorded ones. In the copies, their names
 stand for functions that take both. Everything else is what it was: globals, closures, defaults, objects with their methods.
 """
@@ -15,7 +13,7 @@ import functools
 import inspect
 import math
 import types
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,11 +82,8 @@ class RecordedFunction:
 
     def text(self) -> str:
         """Return the operations as lines of Python."""
-        labels = [
-            label
-            for name, names in zip(self._names, self._arguments)
-            for label in ([name] if names is None else [f"{name}.{each}" for each in names])
-        ]
+        both = zip(self._names, self._arguments)
+        labels = [label for name, each in both for label in ([name] if each is None else [f"{name}.{own}" for own in each])]
         return "\n".join(self._tape.lines(self._results, dict(zip(self._inputs, labels))))
 
     def compact(self) -> RecordedFunction:
@@ -127,10 +122,19 @@ def prepared(function: object) -> Any:
     return _Copies().function(function)
 
 
+def constants_of(functions: Iterable[object]) -> list[object] | None:
+    """Return all objects that functions read besides their arguments, in order; None where one may change and stay the same."""
+    copies = _Copies()
+    for function in functions:
+        copies.function(function)
+    return copies.read if all(map(_is_fixed, copies.read)) else None
+
+
 class _Copies:
-    """Copies of functions, each made once."""
+    """Copies of functions, each made once; ``read`` are the objects that they read."""
 
     def __init__(self) -> None:
+        self.read: list[object] = []
         self._done: dict[int, Any] = {}
         self._kept: list[Any] = []  # what is known by its address stays alive
 
@@ -165,6 +169,7 @@ class _Copies:
         copy = types.FunctionType(function.__code__, scope, function.__name__, None, cells or None)
         self._done[id(function)] = copy
         self._kept.append(function)
+        self.read += function, function.__code__
         copy.__defaults__ = None if function.__defaults__ is None else tuple(map(self.value, function.__defaults__))
         copy.__kwdefaults__ = {name: self.value(value) for name, value in (function.__kwdefaults__ or {}).items()} or None
         for name in _globals_in(function.__code__):
@@ -181,6 +186,7 @@ class _Copies:
 
     def value(self, value: object) -> Any:
         """Return what stands for a value."""
+        self.read.append(value)
         if isinstance(value, (Number, ComplexNumber, recorded_arrays.Numbers, RecordedFunction, _Module, _Object)):
             return value
         own = _own(value)
@@ -271,6 +277,14 @@ def _globals_in(code: types.CodeType) -> set[str]:
     inner = [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
     own = {str(each.argval) for each in dis.get_instructions(code) if each.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
     return own.union(*map(_globals_in, inner))
+
+
+def _is_fixed(value: object) -> bool:
+    """Return whether a value cannot change: what a function reads is looked at by itself."""
+    if isinstance(value, (types.ModuleType, types.BuiltinFunctionType)):
+        return str(getattr(value, "__module__", None) or value.__name__).partition(".")[0] in _FOREIGN
+    plain = value is None or isinstance(value, (types.FunctionType, types.CodeType, float, int, str, complex, np.ufunc))
+    return plain or (isinstance(value, tuple) and all(map(_is_fixed, value)))
 
 
 def _may_hold_functions(value: object) -> bool:

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 import contin
 from contin import ProblemError
 from contin.errors import InterpretedWarning
+from contin.functions import recording
 from contin.functions.derivatives import jacobian, tangents
 from contin.functions.tape import Tape
 from contin.lowlevel import Batch, gradient, minimum, root
@@ -361,6 +362,26 @@ def test_a_changed_constant_is_seen():
     assert batch.is_current()
     law.stiffness = 4.0
     assert not batch.is_current()
+
+
+def test_constants_that_cannot_change_in_place_are_compared_without_a_recording(monkeypatch):
+    """Numbers that a function and what it calls read are compared by identity; with lists, it is recorded anew."""
+    stiffness, other = 2.0, [1.0]
+
+    def force(x):
+        return stiffness * math.sin(x)
+
+    plain = Batch([lambda u, p: force(u.x)], [0], ["x"], [], times=False)
+    listed = Batch([lambda u, p: other[0] * u.x], [0], ["x"], [], times=False)
+    monkeypatch.setattr(recording, "record", lambda *given: pytest.fail("recorded"))
+    assert plain.is_current()
+    with pytest.raises(BaseException, match="recorded"):
+        listed.is_current()
+    monkeypatch.undo()
+    assert listed.is_current()
+    other[0] = 3.0
+    stiffness = 3.0
+    assert not plain.is_current() and not listed.is_current()
 
 
 def test_what_cannot_be_recorded_is_said_once_with_the_reason():
