@@ -1,10 +1,8 @@
 """Boundary value problems from an energy, on one or several segments.
 
-Variational problems on several segments that meet at their ends: structures of strings, rods and strips.
-
-The energy is the sum over the segments. Each has its own canonical equations (`contin.boundary.canonical`), derived once for
-all that are stated alike; conditions between the ends of any number of segments, and what balances there, are those of one
-problem with all states side by side (`contin.boundary.statement`).
+The energy is the sum over the segments, as of strings, rods and strips that meet at their ends. Each has its own canonical
+equations (`contin.boundary.canonical`), derived once for all that are stated alike; conditions between the ends of any number
+of segments, and what balances there, are those of one problem with all states side by side (`contin.boundary.statement`).
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def scaled(
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
         bounds = (*settings.limits.get(primary, ()), *settings.zeros.get(primary, ()))
         said = min((abs(float(number)) for number in bounds if number), default=np.inf)
-        if said >= USUAL[0] and any(first.usual(np.isin(names, unknown)) for _ in range(_VECTORS)):
+        if said >= USUAL[0] and any(first.usual(np.array([name in unknown for name in names])) for _ in range(_VECTORS)):
             sizes = np.where(sizes < USUAL[0], 1.0, sizes)
         else:
             sizes = first.sizes(np.array([given.get(name, 0.0) for name in names]), said)
@@ -98,7 +98,7 @@ def scaled(
     sizes = np.array([stated.get(name, known[alike.get(name, name)]) for name in names])
     of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
     by_name, both = {**of_parameters, **dict(zip(states, sizes))}, (states, list(problem.parameters))
-    found = [usual(np.array([by_name[name] for name in names]), np.isin(names, [*own])) for names in both]
+    found = [usual(np.array([by_name[name] for name in names]), np.array([name in own for name in names])) for names in both]
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
 
 

@@ -1,7 +1,5 @@
 """The matrix of a collocation step: its blocks, their order, its segments, and the protocol of its factors.
 
-The matrix of a collocation step: its blocks, and the order of rows and columns inside an interval's block.
-
 States that depend on each other mutually form a group. Groups are eliminated one after the other, each after those that its
 equations contain, so that the states of a frame that turns at given rates, or of a position that is an integral, cost little.
 

@@ -1,13 +1,9 @@
 """Factorization of the matrix of a collocation step by condensation, and solutions with it and with its transpose.
 
-Substitution: solves with an eliminated matrix and with its transpose.
-
 Right-hand sides stand side by side: each entry of a vector here is `LANES` numbers, one for each right-hand side. A vector is
 given by the address of its first entry.
 
-Factorization of the matrix of a collocation step by condensation, with partial pivoting throughout.
-
-The matrix is drawn in `contin.linalg.blocks.Blocks`. It is eliminated in three stages:
+The matrix is drawn in `contin.linalg.blocks.Blocks`. It is eliminated in three stages, with partial pivoting throughout:
 
 1. in each interval, the interior unknowns, group by group (`Layout`); the border rows are reduced along with it;
 2. in each segment, the mesh points inside, one after the other, each from the 2 n rows that contain it; border rows as before;

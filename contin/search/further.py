@@ -1,7 +1,5 @@
 """Disconnected solutions: deflated iterations at chosen values of a parameter, and images under symmetries.
 
-Disconnected solutions: deflated iterations at chosen values of a parameter, and the account of what was tried.
-
 At each value:
 
 1. Collect the solutions that are known there, of all branches followed so far; those under symmetries count as known.

@@ -1,9 +1,7 @@
 """One solution near a guess: corrected, its mesh adapted, and solutions other than the known ones, by deflation.
 
-Deflation: solutions other than the known ones (Farrell, Birkisson & Funke 2015).
-
-Newton's method is applied to F multiplied by prod (1 + 1 / |x - r|^2) over the known solutions r. Its step is that of F,
-stretched: known solutions repel it.
+Deflation (Farrell, Birkisson & Funke 2015): Newton's method is applied to F multiplied by prod (1 + 1 / |x - r|^2) over the
+known solutions r. Its step is that of F, stretched: known solutions repel it.
 """
 
 from __future__ import annotations
