@@ -11,7 +11,7 @@ import sys
 import types
 import typing
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, ParamSpec, TypeGuard, TypeVar, cast
 
@@ -232,8 +232,8 @@ def arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
         hints, names = _annotations(function)
         refuse_unknown(function, named)
         for name, value in (*zip(names, given), *named.items()):
-            if said := _refusal(name, value, hints.get(name, Any)):
-                raise ProblemError(said)
+            if name in hints and not hints[name][0](value):
+                raise ProblemError(_refusal(name, value, hints[name][1]))
         return function(*given, **named)
 
     return checked
@@ -273,15 +273,15 @@ def fields(record: object) -> None:
     hints, _ = _annotations(cast(Any, type(record)))
     defaults = vars(type(record))
     for name, value in vars(record).items():
-        if (name not in defaults or value is not defaults[name]) and (said := _refusal(name, value, hints.get(name, Any))):
-            raise ProblemError(said)
+        if (name not in defaults or value is not defaults[name]) and name in hints and not hints[name][0](value):
+            raise ProblemError(_refusal(name, value, hints[name][1]))
 
 
 @functools.cache
-def _annotations(annotated: object) -> tuple[dict[str, Any], Sequence[str]]:
-    """Return the types of the arguments of a function, and the names of those given by place; of a class those of fields."""
-    code = getattr(annotated, "__code__", None)
-    return typing.get_type_hints(annotated, include_extras=True), code.co_varnames[: code.co_argcount] if code else ()
+def _annotations(annotated: object) -> tuple[dict[str, tuple[Callable[[Any], bool], Any]], Sequence[str]]:
+    """Return by name what `_fits` says of an argument or a field of a class, and its type; names of those given by place."""
+    code, hints = getattr(annotated, "__code__", None), typing.get_type_hints(annotated, include_extras=True)
+    return {name: (_fits(kind), kind) for name, kind in hints.items()}, code.co_varnames[: code.co_argcount] if code else ()
 
 
 #: What a value of a plain type is called, and whether a value is one.
@@ -295,52 +295,58 @@ _PLAIN: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 }
 
 
-def _refusal(what: str, value: Any, kind: Any) -> str:
-    """Return why a value may not stand where an annotation is, "" if it may; an array is a list.
+def _is_list(value: object) -> bool:
+    array = isinstance(value, np.ndarray) and value.ndim == 1
+    return array or (isinstance(value, Sequence) and not isinstance(value, (str, bytes)))
 
-    In lists and mappings the first entry that is wrong is named.
-    """
+
+@functools.cache
+def _fits(kind: Any) -> Callable[[Any], bool]:
+    """Return the function that says whether a value may stand where an annotation is; an array is a list."""
+    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    if hasattr(kind, "__metadata__"):
+        (low, high), is_real, plain = kind.__metadata__[0], kind.__origin__ is float, _PLAIN[kind.__origin__][1]
+        return lambda value: plain(value) and (low < value < high if is_real else low <= value <= high)
+    if kind in _PLAIN:
+        return _PLAIN[kind][1]
+    if outer is collections.abc.Callable:
+        return callable
+    if outer is np.ndarray:
+        return lambda value: isinstance(value, (np.ndarray, list, tuple))
+    if outer not in (typing.Union, types.UnionType, collections.abc.Mapping, collections.abc.Sequence, tuple):
+        return lambda value: isinstance(value, outer or kind)
+    each = [*map(_fits, inner)]
+    if outer in (typing.Union, types.UnionType):
+        return lambda value: any(fits(value) for fits in each)
+    if outer is collections.abc.Mapping:
+        return lambda value: isinstance(value, Mapping) and all(map(each[0], value)) and all(map(each[1], value.values()))
+    if outer is tuple and inner[-1] is not ...:
+        return lambda value: _is_list(value) and len(value) == len(each) and all(fits(one) for fits, one in zip(each, value))
+    return lambda value: _is_list(value) and all(map(each[0], value))
+
+
+def _refusal(what: str, value: Any, kind: Any) -> str:
+    """Return why a value may not stand where an annotation is, "" if it may: the first entry that is wrong, or all of it."""
+    if _fits(kind)(value):
+        return ""
+    outer, inner = typing.get_origin(kind), typing.get_args(kind)
+    inside, others = iter(list[str]()), [each for each in inner if each is not types.NoneType]
     if hasattr(kind, "__metadata__"):
         (number if kind.__origin__ is float else whole)(what, value, *kind.__metadata__[0])
-        return ""
-    outer, inner = _parts(kind)
-    fits = True
-    inside: Iterator[str] = iter(())
-    if kind in _PLAIN:
-        fits = _PLAIN[kind][1](value)
-    elif outer in (typing.Union, types.UnionType):
-        others = [each for each in inner if each is not types.NoneType]
-        if value is not None and len(others) == 1:
-            return _refusal(what, value, others[0])
-        none = value is None and len(others) < len(inner)
-        fits = none or any(not _refusal(what, value, each) for each in others)
-    elif outer is collections.abc.Callable:
-        fits = callable(value)
-    elif outer is collections.abc.Mapping:
-        fits = isinstance(value, Mapping) and not any(_refusal(what, name, inner[0]) for name in value)
-        inside = (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items()) if fits else inside
-    elif outer is np.ndarray:
-        fits = isinstance(value, (np.ndarray, list, tuple))
-    elif outer in (collections.abc.Sequence, tuple):
-        fixed = outer is tuple and inner[-1] is not ...
-        fits = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
-        fits = (fits or (isinstance(value, np.ndarray) and value.ndim == 1)) and (not fixed or len(value) == len(inner))
-        inside = (_refusal(what, *pair) for pair in zip(value, inner if fixed else [inner[0]] * len(value))) if fits else inside
-    else:
-        fits = isinstance(value, outer or kind)
-    return next(filter(None, inside), "") if fits else f"{what}: {shown(value)} must be {_words(kind)}"
-
-
-@functools.lru_cache(maxsize=256)
-def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Return what an annotation is about, and what stands in its brackets."""
-    return typing.get_origin(kind), typing.get_args(kind)
+    elif outer in (typing.Union, types.UnionType) and value is not None and len(others) == 1:
+        inside = iter([_refusal(what, value, others[0])])
+    elif outer is collections.abc.Mapping and isinstance(value, Mapping) and all(map(_fits(inner[0]), value)):
+        inside = (_refusal(f"{what}: {name}", each, inner[1]) for name, each in value.items())
+    elif outer in (collections.abc.Sequence, tuple) and _is_list(value):
+        kinds = inner if outer is tuple and inner[-1] is not ... else [inner[0]] * len(value)
+        inside = (_refusal(what, *pair) for pair in zip(value, kinds) if len(value) == len(kinds))
+    return next(filter(None, inside), f"{what}: {shown(value)} must be {_words(kind)}")
 
 
 def _words(kind: Any) -> str:
     """Return what may stand where an annotation is."""
     kind = getattr(kind, "__origin__", kind) if hasattr(kind, "__metadata__") else kind  # a number within bounds
-    outer, inner = _parts(kind)
+    outer, inner = typing.get_origin(kind), typing.get_args(kind)
     if kind in _PLAIN:
         return _PLAIN[kind][0]
     if outer in (typing.Union, types.UnionType):

@@ -2,8 +2,8 @@
 
 The characteristic matrix A - z B of a steady state of fields, and its forms: Re d / omega is the first Lyapunov coefficient.
 
-On the mesh B x' = F(x), so that w.B v = 1 of the critical vectors
-(`contin.events.normal_forms`). The mean of |v|^2 over the domain is one, of the states whose rates occur.
+On the mesh B x' = F(x), so that w.B v = 1 of the critical vectors (`contin.events.normal_forms`). The mean of |v|^2 over the
+domain is one, of the states whose rates occur.
 
 Steady states of fields over one coordinate: boundary value problems of which some equations contain rates in time.
 

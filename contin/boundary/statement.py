@@ -1,10 +1,9 @@
 """Boundary value problems: what users state, on one or several segments.
 
-Boundary value problems on several intervals: each segment has its own equations, states and length.
-
-Every segment is mapped to [0, 1], and the states of all stand side by side: u' = rhs(s, u, p) on a segment that begins at s = a
-and has the length l becomes du/dt = l rhs(a + l t, u, p). Segments do not depend on each other but through the conditions at
-their ends, so elimination treats them one by one (`contin.linalg.blocks`).
+Each of several segments has its own equations, states and length; it is mapped to [0, 1], and the states of all stand side by
+side: u' = rhs(s, u, p) on a segment that begins at s = a and has the length l becomes du/dt = l rhs(a + l t, u, p). Segments do
+not depend on each other but through the conditions at their ends, so elimination treats them one by one
+(`contin.linalg.blocks`).
 """
 
 from __future__ import annotations

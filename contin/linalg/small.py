@@ -1,9 +1,8 @@
 """Small matrices in kernels: LU factors, solutions with them, and eigenvalues.
 
-Eigenvalues of a small matrix in a kernel: balanced, brought to Hessenberg form, and found by the shifted QR method.
-
-These are EISPACK's balanc, elmhes and hqr (Smith et al., Matrix Eigensystem Routines, 1976). LAPACK's methods are meant for
-large matrices: of a few rows, a call of NumPy takes ten times as long as all arithmetic.
+For its eigenvalues a matrix is balanced, brought to Hessenberg form, and handed to the shifted QR method: EISPACK's balanc,
+elmhes and hqr (Smith et al., Matrix Eigensystem Routines, 1976). LAPACK's methods are meant for large matrices: of a few rows,
+a call of NumPy takes ten times as long as all arithmetic.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """The phase response of a cycle: by how much a small perturbation makes it early, with errors, and as a picture.
 
-The adjoint of a cycle: how much earlier the motion arrives, for good, after a small perturbation of each state.
-
 On the unit interval, the part of the cycle that is computed (one n-th of it, with a symmetry), y' = G(y, T) with y the states
 divided by their sizes. With M the matrix of the discrete equations, the period T being the only free parameter, the steps are
 

@@ -1,8 +1,6 @@
 """Orbits from integrations in time: a cycle on which a motion has settled, and a homoclinic orbit from its saddle or a cycle.
 
-A homoclinic orbit from its saddle: an orbit that leaves along the unstable direction is followed until it comes back.
-
-With one unstable eigenvalue, and its right and left eigenvectors q and p,
+With one unstable eigenvalue of the saddle, and its right and left eigenvectors q and p,
 
 1. Integrate from e + d q, or e - d q, to where the orbit comes closest to the saddle e again; m = p.(u - e) there.
 2. Do so for values of the parameter, from the one at hand outwards, until m changes its sign between two of them: the orbit
