@@ -1,7 +1,7 @@
 """The rules of one step: predicted, judged, watched, accepted, whatever the equations are.
 
 They are one text. Kernels call them, where points stand one by one in a `Path`; a step that Python makes is row 2 of a path of
-its own, whose row 1 is the state (`length_of`, `predict`, `judged`).
+its own, whose row 1 is the state (`length_of_step`, `predict`, `judged`).
 """
 
 from __future__ import annotations
@@ -188,11 +188,6 @@ def single_step(state: State, settings: Settings) -> Single:
     """Return the room of a step from a state."""
     system = state.system
     return Single(frame_of(system), attempt_of(system.size), control_of(system, settings), path_from(state, 1))
-
-
-def length_of(state: State, settings: Settings) -> float:
-    """Return the length of the step from a state, not far beyond limits."""
-    return length_of_step(single_step(state, settings))
 
 
 def predict(state: State, step: float, settings: Settings = Settings()) -> Array:

@@ -25,7 +25,7 @@ from contin.continuation.first import begins_outside, corrected_first, frozen, o
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
 from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told, unsettled
-from contin.continuation.rules import JUMPS, NOISY, judged, length_of, predict
+from contin.continuation.rules import JUMPS, NOISY, judged, length_of_step, predict
 from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
 from contin.core.newton import correct
@@ -368,7 +368,7 @@ class Continuation:
         """Predict and correct, halving the step until the corrected point can be believed; or return the end of the branch."""
         settings, (step, _, made), self._handed = self._steps.settings, self._handed or (0.0, None, None), None
         if made is None or made[0].system is not state.system:  # the mesh may have changed meanwhile
-            step, made = length_of(state, settings), None
+            step, made = length_of_step(self._steps.room(state)), None
         finest = max(settings.min_step, ROUGH * step)
         while True:
             try:
@@ -384,7 +384,7 @@ class Continuation:
             except ConvergenceError as error:
                 problem = error
                 if isinstance(error, Grazing) and self._went_round(step, error):
-                    state, (step, made) = self.state, (length_of(self.state, settings), None)
+                    state, (step, made) = self.state, (length_of_step(self._steps.room(self.state)), None)
                     continue
                 home: SpecialPoint | None = state.system.home_ahead(state, step)
                 if home is not None and all(test.function(home.trial) <= 0 for test in self._limits):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from contin.arrays import Array
-from contin.continuation.rules import JUMPS, Judgement, aims, judged, judged_as, predicted, single_step
+from contin.continuation.rules import JUMPS, Judgement, Single, aims, judged, judged_as, predicted, single_step
 from contin.core.settings import Settings
 from contin.core.small import ASKS, FAILED
 from contin.core.step import State, corrected, settled
@@ -60,6 +60,14 @@ class Steps:
     settings: Settings
     primary: str
     fold: Event | None
+    _rooms: dict[State, Single] = field(default_factory=dict, init=False, compare=False, repr=False)
+
+    def room(self, state: State) -> Single:
+        """Return the room of steps from a state, one for all lengths that are tried."""
+        if state not in self._rooms:
+            self._rooms.clear()
+            self._rooms[state] = single_step(state, self.settings)
+        return self._rooms[state]
 
     def attempt(
         self, state: State, here: Trial, step: float, made: Made | None = None, near: Array | None = None
@@ -87,7 +95,7 @@ class Steps:
 
     def _made(self, state: State, step: float, near: Array | None) -> Made:
         """Return the end of a step, and what it is judged by."""
-        single = single_step(state, self.settings)
+        single = self.room(state)
         guess = predicted(single, step)
         trial = corrected(state, guess if near is None else near, step, self.settings.newton)
         if state.system.collapsed(state.x, trial.x):

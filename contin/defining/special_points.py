@@ -1,8 +1,6 @@
 """Curves of folds, branch points, extreme values and other special points in two parameters, by their defining systems.
 
-The defining system of a curve of folds in two parameters.
-
-With z all unknowns but the two parameters, the matrix
+Folds: with z all unknowns but the two parameters, the matrix
 
                                    z     g
                                 [ F_z    b ]  [ v ]   [ 0 ]

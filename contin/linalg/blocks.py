@@ -3,10 +3,9 @@
 States that depend on each other mutually form a group. Groups are eliminated one after the other, each after those that its
 equations contain, so that the states of a frame that turns at given rates, or of a position that is an integral, cost little.
 
-Segments: parts of a long mesh that are assembled, eliminated and solved for independently, by several threads.
-
-Their number depends on the size of the matrix only, and so does the order of the arithmetic: results have the same bits for
-any number of threads. A matrix that is not large is one segment, or as many as its problem wants.
+Segments are parts of a long mesh that are assembled, eliminated and solved for independently, by several threads. Their number
+depends on the size of the matrix only, and so does the order of the arithmetic: results have the same bits for any number of
+threads. A matrix that is not large is one segment, or as many as its problem wants.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Functions made from those of users: vector fields of orbits, and mass matrices.
 
-Mass matrices: M u' = F with a constant M becomes u' = f.
-
-A regular M is inverted. Of a singular one, the columns of the states z depend on those of other states k:
-M = M_k [1 E] for u = (k, z). The rates of y = k + E z are known, those of z are not. E = 0 where columns are zero.
-With L1 M_k = 1, and rows L2 that span what M maps nothing to,
+M u' = F with a constant mass matrix M becomes u' = f. A regular M is inverted. Of a singular one, the columns of the states z
+depend on those of other states k: M = M_k [1 E] for u = (k, z). The rates of y = k + E z are known, those of z are not. E = 0
+where columns are zero. With L1 M_k = 1, and rows L2 that span what M maps nothing to,
 
     y' = L1 F(y - E z, z),        0 = L2 F(y - E z, z),
 
