@@ -8,6 +8,7 @@ stays on it, as in a conservative system, passes nothing.
 
 from __future__ import annotations
 
+import cmath
 import dataclasses
 import functools
 import itertools
@@ -191,12 +192,11 @@ def doubling(order: int = 1) -> Event:
 
 
 def _antiperiodic(trial: Trial) -> float:
-    values = trial.settled.system.computed_eigenvalues(trial.settled.x)
-    with np.errstate(invalid="ignore"):  # NaN where there are none
-        size = np.exp(-np.abs(values.real))
-        ahead = np.exp(1j * values.imag)
-        factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
-        return float(np.prod(factors).real)
+    found = 1.0 + 0.0j
+    for value in trial.settled.system.computed_eigenvalues(trial.settled.x).tolist():
+        size, ahead = math.exp(-abs(value.real)), cmath.rect(1.0, value.imag)
+        found *= (size + ahead if value.real > 0 else 1 + size * ahead) / (1 + size)
+    return found.real
 
 
 def doubles(point: Solution) -> bool:

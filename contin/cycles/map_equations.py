@@ -288,7 +288,7 @@ class MapSystem(OfCycles, Algebraic):
         def apart(shift: int) -> float:
             return float(self.weights @ (self.lifted(self.moved(x, shift), reference) - reference) ** 2)
 
-        nearest = min(range(self.rounds), key=apart)
+        nearest = min(range(self.rounds), key=apart) if self.rounds > 1 else 0
         turned = [vector.copy() for vector in vectors]
         for vector in turned:
             self.states(vector)[:] = np.roll(self.states(vector), -nearest, axis=0)

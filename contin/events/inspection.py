@@ -133,6 +133,8 @@ class Inspection:
         closed = self._closed()
         if closed is not None:
             found.insert(0, closed)  # the first point once more, which was labelled already
+        if len(found) < 2:
+            return found
         order = sorted(found, key=lambda point: point.at)
         group = np.cumsum(np.diff([point.at for point in order], prepend=-np.inf) >= _AT_ONCE)
         place = {id(point): number for point, number in zip(order, group)}
@@ -178,8 +180,11 @@ class Inspection:
             points: list[SpecialPoint] | None = test.search(self.arc, self._knots)
             if points is not None:
                 return points
+        ends = self._knots[0][1].value(test), self.arc.trial.value(test)
+        if not (self.folds or crossings or test.looks or test.passed(*ends)):
+            return []
         state = self.arc.state
-        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
+        largest = max(abs(self.arc.before.value(test)), abs(ends[1]))
         known = [point for point in (*self.folds, *crossings) if point.is_located and not self._at_the_start(point)]
         same = [point for point in known if abs(point.trial.value(test)) <= DEPENDENT * largest]
         found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]

@@ -15,12 +15,10 @@ h2 b2 and the parameters k1 b1 + k2 b2 + k b2^2 / 2, are those of Al-Hdaibat, Go
 sides of u' = F(u, p) are expanded in w, z, b1 and b2; p1 times the terms with w b_i, p0 times them and p1 times those with
 z b_i determine h_i and k_i, and p1 times those with b2^2 determines k.
 
-Curves that leave from points of codimension two of equilibria.
-
-Curves of folds and of Hopf points pass there: they begin right at the point. Curves of cycles (folds at generalized Hopf
-points, torus bifurcations at zero-Hopf and double Hopf points) begin where the cycles have no size and their equations are
-singular, and homoclinic orbits at Bogdanov-Takens points likewise. Their first point lies a little beside: a first guess is
-corrected with its size held, and the curve goes on from there to larger ones.
+Curves of folds and of Hopf points pass points of codimension two of equilibria: they begin right there. Curves of cycles
+(folds at generalized Hopf points, torus bifurcations at zero-Hopf and double Hopf points) begin where the cycles have no size
+and their equations are singular, and homoclinic orbits at Bogdanov-Takens points likewise. Their first point lies a little
+beside: a first guess is corrected with its size held, and the curve goes on from there to larger ones.
 
 A cycle of amplitude r beside a Hopf point is u = u0 + r Re(q exp(2 pi i t)), with parameters that differ by O(r^2). The cosine
 of the angle of its multipliers, of which the defining system needs a first value, is taken from this guess as it is. At a
