@@ -16,8 +16,9 @@ from contin.core.settings import Settings
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.arc import Arc, SpecialPoint
+from contin.events.branch_point import BranchPoint
 from contin.events.corner import zeros
-from contin.events.labelled import Stability, contradiction, nullity_of
+from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import refined
 from contin.events.usual import with_normal_form
@@ -122,13 +123,20 @@ def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
 IndexChange = tuple[int | None, int | None]
 
 
+def begun_at(origin: Point | None, first: SpecialPoint) -> SpecialPoint:
+    """Return the first point of a run with what is known of the simple branch point that it is: its details and errors."""
+    trial, known = first.trial, finding_of(origin and origin.details)
+    if origin is None or not isinstance(known, BranchPoint) or origin.system is not trial.system or (origin.x != trial.x).any():
+        return first
+    return dataclasses.replace(first, details=known.along(trial.system, trial.tangent), errors=origin.errors or None)
+
+
 def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     """Return a special point located again on finer meshes, with its errors, if these are wanted."""
     if not found.label or not (found.is_located or found.stop is not None):
         return found  # a regular point, or one that gets no label
-    labelled = found.label != Label.FAILED and not found.closes
     before = found
-    if found.errors is None and labelled and settings.errors:
+    if found.errors is None and settings.errors and found.label != Label.FAILED and not found.closes:
         again = refined(found.same_as or found, settings)
         details = found.details if found.same_as else again.details
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors, is_lost=again.is_lost)
@@ -158,11 +166,10 @@ def index_changes(index: Event | None, arc: Arc, special: Sequence[SpecialPoint]
     if index is None or not special:
         return [None] * len(special)
     groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
-    middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
+    middles = (arc.near((a[-1].at + b[0].at) / 2) for a, b in itertools.pairwise(groups))
     last = special[-1]  # behind a limit the step does not belong to the branch
     ends_there = last.stop is not None and last.test is not None and last.same_as is None
-    between = [arc.before, *(arc.near(s) for s in middles), last.trial if ends_there else arc.trial]
-    values = [trial.value(index) for trial in between]
+    values = [trial.value(index) for trial in (arc.before, *middles, last.trial if ends_there else arc.trial)]
     whole = [None if np.isnan(value) else int(value) for value in values]
     changes: list[IndexChange | None] = []
     for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
@@ -195,8 +202,7 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
 
 def _kept(found: SpecialPoint) -> SpecialPoint:
     """Return a special point without what takes much memory."""
-    trial = Trial.without_tangent(found.trial.system, found.trial.x)
-    return dataclasses.replace(found, trial=trial, same_as=None, coarse=None)
+    return dataclasses.replace(found, trial=Trial.without_tangent(found.trial.system, found.trial.x), same_as=None, coarse=None)
 
 
 def _with_normal_form(found: SpecialPoint, coarse: SpecialPoint) -> tuple[str, Any]:

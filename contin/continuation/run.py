@@ -24,7 +24,7 @@ from contin.continuation.failure import ended, limit_neared, met, no_convergence
 from contin.continuation.first import begins_outside, corrected_first, frozen, on_branch
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
 from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
-from contin.continuation.points import IndexChange, Notes, index_changes, is_confirmed, located_again, told, unsettled
+from contin.continuation.points import IndexChange, Notes, begun_at, index_changes, is_confirmed, located_again, told, unsettled
 from contin.continuation.rules import JUMPS, NOISY, judged, length_of_step, predict
 from contin.continuation.steps import Step, Steps
 from contin.core.labels import Label
@@ -63,6 +63,8 @@ class Continuation:
         Continue from here instead (x and tangent are then not used).
     start : tuple (system, x, tangent), optional
         With ``state``: the first point of the run that is continued, to recognise a closed branch.
+    origin : Point, optional
+        The labelled branch point that x is: its errors are known.
 
     Raises
     ------
@@ -83,7 +85,7 @@ class Continuation:
 
     def __init__(
         self, system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None,
-        state: State | None = None, start: Start | None = None, singular: bool = True,
+        state: State | None = None, start: Start | None = None, singular: bool = True, origin: Point | None = None,
     ) -> None:  # fmt: skip
         self.stop: Stop | None = None
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
@@ -110,6 +112,7 @@ class Continuation:
         self._watch = Watch(self.start, self._path, self._tests, general, self._steps.fold)
         if state is None:
             self._notes.check_phases(self.here())
+        self._origin = origin
         self._handed: Handed | None = None  # the next step, where a kernel has made it
         self._left: list[tuple[float, Array]] = []  # corners: the arclength, and the place with the tangent of the way on
         self._adapted = -1  # regular points at which the mesh was looked at last
@@ -165,7 +168,8 @@ class Continuation:
         if not self._resumed:
             trial = self.here()
             first = SpecialPoint(0.0, Label.BRANCH_POINT if self.state.singular else Label.END, "start", trial)
-            located = located_again(dataclasses.replace(first, label=trial.system.judged(first).label), self.settings)
+            first = dataclasses.replace(first, label=trial.system.judged(first).label)
+            located = located_again(begun_at(self._origin, first), self.settings)
             self._notes.corners(trial)
             self._notes.contacts(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
@@ -213,8 +217,7 @@ class Continuation:
     def here(self) -> Trial:
         """Return the state's point, as the step before left it, so that both decide from the same values."""
         if self._end is None:
-            state = self.state
-            self._end = Trial(state.system, state.x, Linearization(state.tangent, state.sign))
+            self._end = Trial(self.state.system, self.state.x, Linearization(self.state.tangent, self.state.sign))
         return self._end
 
     def go_on(self, moved: Moved | None) -> bool:

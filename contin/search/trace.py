@@ -62,13 +62,9 @@ def switched(
     first mesh from a Hopf point has the ``fewest`` intervals of a run, or more. ``way`` is +1 or -1, as ``direction``. Raises
     ProblemError where none begin there; ConvergenceError where the branch point of doubled orbits is not found.
     """
-    if doubles(point):
-        found, x, along = doubled(point)
-    else:
-        found, x, along = from_hopf(point, max(fewest, _INTERVALS))
+    found, x, along = doubled(point) if doubles(point) else from_hopf(point, max(fewest, _INTERVALS))
     if free is not None:
-        cycles = found
-        found, x = cycles.with_free(checks.names("free", free), x)
+        cycles, (found, x) = found, found.with_free(checks.names("free", free), x)
         along = found.pack(cycles.states(along), dict.fromkeys(found.free, 0.0))
     system: Any = point.system
     if doubles(point) or system.is_smooth(point.x, frequency_of(point)):
@@ -110,10 +106,7 @@ def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[Cy
     parameters = np.ones(len(names))
     parameters[[names.index(name) for name in cycles.free]] = np.abs([cycles.parameter(x, name) for name in cycles.free])
     sizes = usual(np.where(states > APART, states, 0.0)), usual(np.where(parameters > APART, parameters, 0.0))
-    if all(np.all(found == 1) for found in sizes):
-        return cycles, x
-    scaled, x = cycles.with_scales(x, *sizes)
-    return scaled, x
+    return (cycles, x) if all(np.all(found == 1) for found in sizes) else cycles.with_scales(x, *sizes)
 
 
 def small_cycle(
@@ -351,7 +344,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     settings, shown = settings_with(settings, options), Progress(progress)
     system, x, along, singular = _first(start, settings, free, branch, tangent)
-    return follow_until_interrupted(Continuation(system, x, settings, along, singular=singular), shown)
+    return follow_until_interrupted(Continuation(system, x, settings, along, singular=singular, origin=start), shown)
 
 
 def _first(
@@ -425,9 +418,7 @@ def _solution(start: Point, free: Sequence[str] | None) -> tuple[Point, tuple[st
         return found, names
     system, x = found.system.with_free(names, found.x)  # type: ignore[attr-defined]
     found = dataclasses.replace(found, x=x, tangent=np.full(x.size, np.nan), system=system)
-    if Label.BRANCH_POINT not in (start.label, found.label):
-        return found, names
-    return _as_branch_point(found), names
+    return (_as_branch_point(found) if Label.BRANCH_POINT in (start.label, found.label) else found), names
 
 
 def _as_branch_point(found: Point) -> Point:

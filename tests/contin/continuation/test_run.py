@@ -301,3 +301,14 @@ def test_cycles_that_begin_at_a_point_are_followed_once():
     (hopf,) = trace(solve(normal, [0.0, 0.0]), free=["m"], direction="both", limits={"m": (-1.2, 1)}).labelled("HB")
     both, ahead = (trace(hopf, branch=1, direction=way, limits={"m": (-1, 1)}) for way in ("both", 1))
     assert len(both) == len(ahead) and both[0].label == "HB" and both.stop == ahead.stop
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_run_from_a_branch_point_knows_it(number):
+    """Its value, its ± and its tangents are those of the labelled point, the first tangent that of the run."""
+    pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
+    (fork,) = trace(solve(pitchfork, [0.0]), free=["a"], limits={"a": (-1, 1)}).labelled("BP")
+    start = trace(fork, branch=number, limits={"a": (-1, 1)}).points[0]
+    assert start.name == "start" and start["a"] == fork["a"] and start.errors == fork.errors
+    along, other = start.details.tangents
+    assert abs(along @ start.tangent - 1) < 1e-12 and abs(other @ start.tangent) < 1e-12
