@@ -16,7 +16,7 @@ from contin.core.newton import Newton
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.settings import Settings
 from contin.core.step import ROUNDS, corrected, located, standing_at
-from contin.core.trial import Event, Trial
+from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint, Value, find_zero
 from contin.events.branch_point import locate_branch_point
@@ -87,16 +87,16 @@ class _Found(NamedTuple):
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
-    The first finer mesh of one whose error is above that tolerance, as on a path that is less exact, is made for the tolerance.
-    Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, or another kernel) is dropped; if Newton's method fails, it stays, without errors.
-    What is left after two moves follows from the last one by the order that both have, unless it is below the tolerance of
-    Newton's method. Where halving the mesh no longer brings a point much closer, it moves by round-off: its error is the larger
-    of the last two moves. On a mesh of more than ``max_intervals`` intervals, or on which it moves further than on the one
-    before, only the estimate is made: the point stays on the one before.
+    The first finer mesh of one whose error is above that tolerance is made for the tolerance. Without a mesh it is located once
+    more: the change is the error of its location. A point that is not the coarse one again (far from it, or another kernel) is
+    dropped; where Newton's method fails it has no errors. What is left after two moves follows from the last one by the order
+    that both have, unless it is below the tolerance of Newton's method. Where a halved mesh brings it hardly closer, it moves
+    by round-off: its error is the larger of the last two moves. No error is below what Newton's method leaves. On more than
+    ``max_intervals`` intervals, or where it moves further than before, only the estimate is made: it stays on the mesh before.
     """
     trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
+    holds = point.test is not None and point.test.holds_one_of(trial.system.free)
     if finding_of(details).is_lost or not trial.system.may_branch(trial.x):  # no cycle of no size is found again
         return Refined(trial, errors, details, is_lost=finding_of(details).is_lost)
     try:
@@ -107,9 +107,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     for number in range(_HALVINGS):
         coarse = trial.system
         made = None if number else _on_made_mesh(point, now, settings)
-        finer = None if made else coarse.refined()
         try:
-            again = made or _again(point, now, finer or (coarse, np.array), settings.newton)
+            again = made or _again(point, now, coarse.refined() or (coarse, np.array), settings.newton)
             better, found, left, _ = now = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
@@ -119,7 +118,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         steps = moves = np.maximum(np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :]), least)
         if made:
             steps = moves * _part_left(trial, better)
-            if point.test is not None and point.test.holds_one_of(system.free) and not system.on_curve:
+            if holds and not system.on_curve:
                 steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
         moved = float(np.max((steps := np.maximum(steps, least)) / size))
         if np.any(steps > _FAR * size):
@@ -129,21 +128,22 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if seen and not too_fine:
             part = _part_by_order(*seen, moved, system.degree)
             steps, left = np.maximum(part * steps, np.minimum(steps, settings.newton.tolerance * size)), _SAFE * left
-        if made or finer:
-            seen = float(np.max(moves / size)), np.log2(system.intervals / coarse.intervals)
-        settled = np.maximum(np.maximum(settings.mesh.tolerance * size, left), least) >= steps
+        noise = 0.0 if holds else max(trial.newton_error, better.newton_error)
+        if noise > settings.newton.tolerance:  # round-off moves the point so far, about the way that it has moved
+            steps = steps * max(noise / float(np.max(steps / size)), 1.0)
+        settled = np.maximum(np.maximum(max(settings.mesh.tolerance, noise) * size, left), least) >= steps
         change = np.maximum(steps, before) if moved > _CLOSER * last else steps
         known = change + left + finding_of(found).split(system)  # a curve of branch points has one unknown more
-        if moved > last or not (made or finer) or too_fine:
+        if moved > last or not system.intervals or too_fine:
             break  # such a mesh serves the estimate only
-        trial, details = better, found
+        trial, details, seen = better, found, (float(np.max(moves / size)), np.log2(system.intervals / coarse.intervals))
         if np.all(settled) or moved > _CLOSER * last:
             break
         before, last = steps, moved
     if known is not None:
         known = (known + finding_of(details).round_off(trial.system, settings.newton))[: len(errors)]
         errors = dict(zip(errors, map(float, known * trial.system.free_scales)))
-    return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings), details, is_lost)
+    return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings.primary), details, is_lost)
 
 
 def _on_made_mesh(point: SpecialPoint, coarse: _Found, settings: Settings) -> _Found | None:
@@ -159,12 +159,11 @@ def _on_made_mesh(point: SpecialPoint, coarse: _Found, settings: Settings) -> _F
     if not (test.holds_one_of(system.free) or trial.value(test)) or not trial.discretization_error > control.tolerance:
         return None
     made = system.adapted(trial.x, dataclasses.replace(control, min_intervals=min(2 * system.intervals, control.max_intervals)))
-    if made is None or made[0].intervals < 2 * system.intervals:
-        return None
-    with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
-        there = _again(point, coarse, made, settings.newton)
-        x = there.trial.x[made[0].state_size :]
-        return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else None
+    if made is not None and made[0].intervals >= 2 * system.intervals:
+        with contextlib.suppress(ConvergenceError):  # the mesh is halved as if there were no better one
+            there = _again(point, coarse, made, settings.newton)
+            x = there.trial.x[made[0].state_size :]
+            return there if np.all(np.abs(x - trial.x[system.state_size :]) <= _FAR * (1 + np.abs(x))) else None
     return None
 
 
@@ -185,9 +184,7 @@ def _part_by_order(before: float, halvings: float, now: float, degree: int) -> f
     return min(_SAFE * max((now / before) ** (1 / halvings), 0.5 ** (1.5 * degree)), 1.0)
 
 
-def _with_cut_off(
-    errors: dict[str, float], trial: Trial, test: Event | None, slope: float, settings: Settings
-) -> dict[str, float]:
+def _with_cut_off(errors: dict[str, float], trial: Trial, test: Any, slope: float, primary: str | None) -> dict[str, float]:
     """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
 
     A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
@@ -197,9 +194,7 @@ def _with_cut_off(
     moves = system.cut_off_errors(trial.x, trial.factors) if np.isfinite(along).all() else np.empty((0, system.size))
     if not len(moves) or not np.isfinite(moves).all():
         return errors
-    if test is None:
-        primary = settings.primary or system.free[0]
-        test = Event(Label.END, "start", lambda trial: trial[primary])
+    test = test or Event(Label.END, "start", lambda trial: trial[primary or system.free[0]])
     if test.label != Label.FOLD:
         slope = _change(test, trial, along) if np.isnan(slope) else slope
         for move in moves:
@@ -211,7 +206,8 @@ def _with_cut_off(
 def _change(test: Event, trial: Trial, move: Array) -> float:
     """Return by how much a test function changes along a move, by its difference over a distance that suits."""
     part = ASIDE / float(np.abs(move).max())
-    return (test.function(Trial.without_tangent(trial.system, trial.x + part * move)) - test.function(trial)) / part
+    x, row = trial.x + part * move, trial.system.weights * trial.tangent
+    return (test.function(Trial(trial.system, x, lambda: linearization(trial.system, x, row))) - trial.value(test)) / part
 
 
 def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> _Found:
@@ -266,7 +262,7 @@ def zero_again(
     factors: Factors | None = None
 
     def at(s: float, near: tuple[float, Trial] | None = None) -> Trial:
-        if near is not None and abs(s - near[0]) < LOCATED:  # the tangent leads there, up to the square
+        if near is not None and abs(s - near[0]) < max(LOCATED, near[1].newton_error):  # up to the square
             place, trial = near
             shifted = trial.x + (s - place) * trial.tangent
             return Trial(trial.system, shifted, trial.linear, trial.iterations, trial.newton_error)
@@ -276,8 +272,7 @@ def zero_again(
             moved = trial.system.on_switches(trial.x, closely=True)
             if moved is None:
                 break
-            carry = system.carrier(moved[0])
-            base, along = carry(x), carry(state.tangent)
+            base, along = map(system.carrier(moved[0]), (x, state.tangent))
             moving = standing_at(moved[0], base, along / np.sqrt(inner(moved[0], along, along)), 1.0)
             trial = located(moving, moved[1](trial.x), s, newton)
         return trial
@@ -315,9 +310,11 @@ def _by_secants(at: Callable[..., Trial], here: Trial, test: Event, slope: float
     value = test.function(here)
     if value == 0:
         return here, 0.0, slope
+    if not np.isfinite(value):
+        raise Elsewhere("the test function is not defined on the finer mesh")
     best, s = (0.0, value, here), -value / (slope or np.nan)
-    if abs(s) < CORRECTED:
-        return at(s, (0.0, here)), abs(s), slope
+    if abs(s) < max(CORRECTED, here.newton_error):
+        return at(s, (0.0, here)), max(abs(s), here.newton_error), slope
     near = other = place(s) if abs(s) < ROUGH else best
     if not abs(near[1]) <= _NEARER * abs(value):
         other = place(ROUGH)

@@ -25,11 +25,17 @@ def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
         assert abs(point["L"] - length) < point.errors["L"] < 1e-6
 
 
+class Place(float):
+    """A point of a curve, by its place alone."""
+
+    newton_error = 0.0
+
+
 @pytest.mark.parametrize("zero", [1.4e-6, -2e-5, 3e-12])
 def test_a_zero_of_a_function_that_bends_at_once_is_no_round_off(zero):
     """The function is 1 at the first distance of the secants: 0 was returned for the first zero, and nothing for the second."""
     test = SimpleNamespace(function=lambda s: math.tanh(1e5 * (s - zero)), label="PD")
-    place, apart, _ = refinement._by_secants(lambda s, near=None: s, 0.0, test)
+    place, apart, _ = refinement._by_secants(lambda s, near=None: Place(s), Place(0.0), test)
     assert abs(place - zero) < 1e-13 and apart < 1e-9
 
 
@@ -38,8 +44,26 @@ def test_a_slope_from_another_mesh_is_believed_where_it_leads_to_zero(slope, loo
     """Otherwise the function is looked at further off."""
     seen = []
     test = SimpleNamespace(function=lambda s: seen.append(s) or 2 * (s - 1e-8), label="PD")
-    place, _, known = refinement._by_secants(lambda s, near=None: s, 0.0, test, slope)
+    place, _, known = refinement._by_secants(lambda s, near=None: Place(s), Place(0.0), test, slope)
     assert place == pytest.approx(1e-8, abs=1e-15) and known == pytest.approx(2) and len(seen) == looks
+
+
+@pytest.mark.parametrize(("zero", "left"), [(3e-9, 1e-8), (3e-8, 0.0)])
+def test_a_zero_nearer_than_what_newtons_method_leaves_is_not_looked_for(zero, left):
+    """The place is then known as well as points are; further off it is looked for."""
+    seen, here = [], Place(0.0)
+    here.newton_error = 1e-8
+    test = SimpleNamespace(function=lambda s: seen.append(s) or 2 * (s - zero), label="PD")
+    place, apart, _ = refinement._by_secants(lambda s, near=None: Place(s), here, test, 2.0)
+    assert place == pytest.approx(zero, abs=1e-15) and (apart == left or not left) and len(seen) == 2 - bool(left)
+
+
+def test_a_test_function_that_is_not_defined_is_looked_at_once():
+    seen = []
+    test = SimpleNamespace(function=lambda s: seen.append(s) or math.nan, label="IFS")
+    with pytest.raises(ConvergenceError, match="not defined on the finer mesh"):
+        refinement._by_secants(lambda s, near=None: Place(s), Place(0.0), test)
+    assert len(seen) == 1
 
 
 def test_the_slope_that_a_step_has_seen_is_that_on_finer_meshes(monkeypatch):
