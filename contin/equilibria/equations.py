@@ -483,10 +483,14 @@ class Algebraic(Spectral, Composed):
     def is_smooth(self, x: Array, frequency: float | None, form: EquilibriumForm | None = None) -> bool:
         """Return whether the field at a Hopf point is a polynomial of third degree but for terms of fourth, along small cycles.
 
-        It is tried on smaller and smaller ones, until what is left is round-off. ``form`` is that at x, if it is at hand.
+        Where its operations do not tell, smaller and smaller ones are tried, until what is left is round-off. ``form`` is that
+        at x, if it is at hand.
         """
         field, last, ratio = self.thawed.as_field(), np.nan, np.nan
-        (term,), pair = field._terms, (form or self.form(x)).pair(frequency)
+        (term,) = field._terms
+        if term.batch.recorded is not None and term.batch.recorded.is_analytic:
+            return True
+        pair = (form or self.form(x)).pair(frequency)
         turning = np.exp(2j * np.pi * np.arange(_WAVES) / _WAVES)[:, None] * pair.right / np.abs(pair.right).max()
         waves, along = turning.real, (1j * pair.frequency * turning).real
         _, u, none, p = term.inputs(x)

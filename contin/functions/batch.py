@@ -52,6 +52,12 @@ class Request(NamedTuple):
 #: A program, the number of its values, and the shape of its Jacobian at one point; empty without one.
 _Made = tuple[Program, int, tuple[int, ...]]
 
+#: Operations that are analytic wherever they are finite: roots, logarithms and powers are not at 0.
+_ANALYTIC = {
+    "input", "constant", "add", "sub", "mul", "div", "neg", "sum", "dot", "linear", "product",
+    "exp", "exp2", "expm1", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan",
+}  # fmt: skip
+
 
 class Recorded:
     """Functions that are recorded, for `contin.functions.batch.Batch`; raise Unrecordable where they cannot be.
@@ -123,6 +129,12 @@ class Recorded:
         """Return whether derivatives by these inputs may change."""
         tape, every = self.recording.tape, set(self.recording.inputs)
         return bool(self._once(("bends", inputs), lambda: not every.isdisjoint(tape.needed(self._slopes(inputs).values()))))
+
+    @property
+    def is_analytic(self) -> bool:
+        """Values are analytic functions wherever they are finite: no operation is one that is not."""
+        tape = self.recording.tape
+        return {tape.operations[place].name for place in tape.needed(self.recording.results)} <= _ANALYTIC
 
     def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian that may differ from zero."""

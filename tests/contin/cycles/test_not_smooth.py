@@ -102,6 +102,15 @@ def test_smooth_terms_keep_their_normal_form(term):
     assert "not smooth" not in point.name and point.normal_form is not None
 
 
+def test_analytic_operations_are_smooth_without_a_look(monkeypatch):
+    """Neither the normal form nor third derivatives are computed for the cycles: the frequency is known from the location."""
+    from contin.lowlevel import Algebraic
+
+    point = hopf_of(lambda u, p: (p.m * u.x - math.sin(u.y), u.x + p.m * u.y - u.y**3 / (2 + u.x)))
+    monkeypatch.setattr(Algebraic, "stack_along", lambda *given: pytest.fail("a derivative was taken"))
+    assert contin.trace(point, branch=1, limits={"m": (-0.1, 0.1)}, max_points=3)[0].label == "HB"
+
+
 def test_derivatives_of_roots_of_squares_are_finite_at_zero():
     from contin.lowlevel import Algebraic
 
