@@ -26,11 +26,11 @@ from .results.spectrum import Spectrum
 from .results.storage import StoredColumns, read_branches, read_columns
 from .search.further import Searched, further
 from .search.trace import follow, oscillation
-from .text import exact_text, meant, one_of, shown
+from .text import Shown, exact_text, meant, one_of, shown
 
 __all__ = [
     "Algebraic", "Batch", "BranchPoint", "Collocation", "Colour", "Continuation", "Label", "MultiplePoint", "PALETTE",
-    "PhaseResponse", "Searched", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
+    "PhaseResponse", "Searched", "Shown", "Spectrum", "State", "Stop", "StoredColumns", "Trial", "Undetermined", "basis",
     "cache_directory", "condense_forms", "correct", "eigenbasis", "error", "exact_text", "follow", "further", "gradient",
     "hermite", "interpolation", "least", "levels", "locate_branch_point", "meant", "minimum", "one_of", "oscillation",
     "point_of", "read_branches", "read_columns", "root", "shown", "temporary_name", "through", "write_whole",

@@ -113,6 +113,12 @@ def shown(made: Any) -> str:
     return f"{type(made).__name__}({', '.join(fields)})"
 
 
+class Shown:
+    """What shows itself so: a base class of dataclasses with ``repr=False``."""
+
+    __repr__ = shown
+
+
 def _text(value: object) -> str:
     """Return a value behind the name of its field."""
     if isinstance(value, np.ndarray):

@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from contin import Settings, trace
-from contin.lowlevel import Collocation, Label, levels, point_of, shown
+from contin.lowlevel import Collocation, Label, Shown, levels, point_of
 from ribbon_model.descent import KICK, LONGEST, SEGMENTS, descend, modes
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
@@ -158,8 +158,8 @@ _INTERVALS, _DEGREE = 8, 7
 _LARGEST, _MOST = 100.0, 200
 
 
-@dataclass(frozen=True)
-class Folding:
+@dataclass(frozen=True, repr=False)
+class Folding(Shown):
     """The path from a circle to the first free state, with couples at two opposite points.
 
     Attributes
@@ -172,8 +172,6 @@ class Folding:
     couples: np.ndarray
     angles: np.ndarray
     energies: np.ndarray
-
-    __repr__ = shown
 
     @property
     def peak(self) -> int:

@@ -20,7 +20,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contin.lowlevel import Collocation, shown
+from contin.lowlevel import Collocation, Shown
 from ribbon_model import ends
 from ribbon_model.ends import CLAMPED, FREE, HINGED, JOINT
 from ribbon_model.members import BALL, HINGE, RIGID, START, JointEnd
@@ -33,8 +33,8 @@ from ribbon_model.shape import frames
 _FEWEST = 12
 
 
-@dataclass(frozen=True, eq=False)
-class Piece(Chain):
+@dataclass(frozen=True, eq=False, repr=False)
+class Piece(Chain, Shown):
     """A strip of segments, which begins with a frame at a place.
 
     Attributes
@@ -53,8 +53,6 @@ class Piece(Chain):
     first: np.ndarray
     place: np.ndarray
     free: tuple[int, ...]
-
-    __repr__ = shown
 
     @property
     def segment(self) -> float:
@@ -142,8 +140,8 @@ class _Condition:
     other: _End | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class NetworkChain:
+@dataclass(frozen=True, eq=False, repr=False)
+class NetworkChain(Shown):
     """A network of segments.
 
     Attributes
@@ -161,8 +159,6 @@ class NetworkChain:
     numbers: Mapping[str, float]
     pieces: tuple[Piece, ...]
     asked: int
-
-    __repr__ = shown
 
     @property
     def strains(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, interpolation, levels, shown
+from contin.lowlevel import Shown, basis, interpolation, levels
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
@@ -69,7 +69,7 @@ class Symmetry:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Equilibrium:
+class Equilibrium(Shown):
     """A closed equilibrium, B = 1, L = 2 pi.
 
     Attributes
@@ -100,8 +100,6 @@ class Equilibrium:
     mesh: np.ndarray
     degree: int
     inside: np.ndarray | None = None
-
-    __repr__ = shown
 
     def response(self, moment):
         """Return the strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""

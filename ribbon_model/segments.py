@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from contin.lowlevel import levels, shown
+from contin.lowlevel import Shown, levels
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.law import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
@@ -168,8 +168,8 @@ class Chain:
 # --- the discrete strip -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Strip(Chain):
+@dataclass(frozen=True, eq=False, repr=False)
+class Strip(Chain, Shown):
     """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
 
     Attributes
@@ -186,8 +186,6 @@ class Strip(Chain):
     parameters: float | Mapping[str, float]
     kappa_n: float
     strains: np.ndarray
-
-    __repr__ = shown
 
     @property
     def first(self) -> np.ndarray:

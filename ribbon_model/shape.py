@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.lowlevel import basis, interpolation, shown
+from contin.lowlevel import Shown, basis, interpolation
 from ribbon_model.equilibrium import directors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shape:
+class Shape(Shown):
     """A strip in space, or a part of it.
 
     Attributes
@@ -34,8 +34,6 @@ class Shape:
     eta: np.ndarray
     breadth: float | np.ndarray = 1.0
     depth: float | np.ndarray = 1.0
-
-    __repr__ = shown
 
     def closure(self) -> float:
         """Return the largest difference between the two ends, in position and directors."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin import Point
-from contin.lowlevel import Collocation, shown
+from contin.lowlevel import Collocation, Shown
 from ribbon_model import stability
 from ribbon_model.domains import CELL, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH, on_directors
@@ -19,7 +19,7 @@ from ribbon_model.stability import Stability
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(Shown):
     """An equilibrium of a closed strip, on the domain that it was computed on; B = 1, L = 2 pi.
 
     Attributes
@@ -53,8 +53,6 @@ class Solution:
     states: np.ndarray
     degree: int
     parameters: Mapping[str, float]
-
-    __repr__ = shown
 
     @classmethod
     def of(cls, point: Point) -> Solution:

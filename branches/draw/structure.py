@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from branches.draw.solid import Mesh, solid, surface, together
-from contin.lowlevel import shown
+from contin.lowlevel import Shown
 from ribbon_model.ends import DIRECTIONS, Vector, perpendicular
 from ribbon_model.shape import Shape
 
@@ -89,14 +89,12 @@ class Fixture:
         return Mesh(points.reshape(-1, 3), quads, np.full(len(rings) * sides, station))
 
 
-@dataclass(frozen=True)
-class Structure:
+@dataclass(frozen=True, repr=False)
+class Structure(Shown):
     """Several strips in space, with their joints and supports."""
 
     parts: tuple[Shape, ...]
     fixtures: tuple[Fixture, ...] = ()
-
-    __repr__ = shown
 
     @property
     def centreline(self) -> np.ndarray:

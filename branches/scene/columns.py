@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from contin.lowlevel import shown
+from contin.lowlevel import Shown
 
 if TYPE_CHECKING:  # columns of a stored result need no engine
     from contin import Point
@@ -78,7 +78,7 @@ class Change:
 
 
 @dataclass(frozen=True, repr=False)
-class Column:
+class Column(Shown):
     """A column of results.
 
     Attributes
@@ -109,8 +109,6 @@ class Column:
     brief: str = ""
     of_labelled: bool = False
     derived: Callable[[Any], np.ndarray] | None = None
-
-    __repr__ = shown
 
     def of(self, row: Row) -> Any:
         """Return its value at a point."""
@@ -171,13 +169,11 @@ OWN = (*(one.name for one in (*_BOOK, *_INDEX)), "energy", "stage")
 
 
 @dataclass(frozen=True, repr=False)
-class Columns:
+class Columns(Shown):
     """All columns of a result, in the order of its tables: book-keeping, values, the index."""
 
     values: tuple[Column, ...]
     watched: bool
-
-    __repr__ = shown
 
     @functools.cached_property
     def all(self) -> dict[str, Column]:

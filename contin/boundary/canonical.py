@@ -32,11 +32,11 @@ from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recording import recorded_paths
 from contin.functions.stand_ins import RecordedFunction
 from contin.functions.tape import Number, Tape, Unrecordable
-from contin.text import shown
+from contin.text import Shown
 
 
-@dataclass(frozen=True)
-class Variation:
+@dataclass(frozen=True, repr=False)
+class Variation(Shown):
     """What a variational problem is made of; as in `contin.VariationalProblem`.
 
     ``hamiltonian`` stands instead of ``energy`` and ``kinematics``, or is None.
@@ -57,11 +57,9 @@ class Variation:
     end_work: Function | None = None
     pushes: Mapping[int, str] = dataclasses.field(default_factory=dict)
 
-    __repr__ = shown
 
-
-@dataclass(frozen=True)
-class Canonical:
+@dataclass(frozen=True, repr=False)
+class Canonical(Shown):
     """The derived functions, and how many multipliers of end conditions there are.
 
     ``rhs(t, u, p)``, ``boundary(u0, u1, p)``, ``integrals(t, u, p)`` or None, and ``functionals[name](t, u, p)`` take u = (x,
@@ -76,8 +74,6 @@ class Canonical:
     legendre: Function | None
     sigmas: int
     fixed: tuple[tuple[int, ...], tuple[int, ...]]
-
-    __repr__ = shown
 
 
 def canonical(variation: Variation) -> Canonical:

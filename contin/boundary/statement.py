@@ -31,7 +31,7 @@ from contin.functions.batch import Batch
 from contin.functions.recording import result_count
 from contin.functions.signature import Arguments, Signature, argument_count, named_values
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement, portable
-from contin.text import shown
+from contin.text import Shown, shown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -330,7 +330,7 @@ Quantity = float | str | Function
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segment(checks.Named):
+class Segment(checks.Named, Shown):
     """One interval of a `SegmentedProblem`, with its own equations.
 
     Parameters
@@ -360,8 +360,6 @@ class Segment(checks.Named):
     length: Quantity = 1.0
     begin: Quantity | None = None
     functionals: Mapping[str, Function] = field(default_factory=dict)
-
-    __repr__ = shown
 
     def portable(self, names: tuple[str, ...], parameters: tuple[str, ...]) -> Segment:
         """Return the segment with recordings in the place of functions that no other process finds by name."""

@@ -32,7 +32,7 @@ from contin.functions.signature import Arguments, argument_count
 from contin.levels import LOCATED
 from contin.problems.rewriting import of_parameters
 from contin.problems.statement import check_statement, portable
-from contin.text import shown
+from contin.text import Shown
 
 
 class VariationalProblem(BoundaryValueProblem):
@@ -309,8 +309,8 @@ def _check_names(
         raise ProblemError("parameters: 'energy' is the name of the energy's own column")
 
 
-@dataclass(frozen=True, eq=False)
-class VariationalSegment(checks.Named):
+@dataclass(frozen=True, eq=False, repr=False)
+class VariationalSegment(checks.Named, Shown):
     """One interval of a `SegmentedVariationalProblem`: what varies there, and its energy.
 
     Parameters
@@ -345,8 +345,6 @@ class VariationalSegment(checks.Named):
     hamiltonian: Function | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
     work: Function | None = None
-
-    __repr__ = shown
 
     @property
     def stated(self) -> dict[str, Any]:

@@ -15,14 +15,14 @@ from contin.errors import ProblemError, Within
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import ReadOnlyMatrix, Vector
 from contin.levels import CORRECTED
-from contin.text import shown
+from contin.text import Shown
 
 DEGREES = range(2, 9)
 Degree = Annotated[int, Within(DEGREES[0], DEGREES[-1])]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Basis:
+class Basis(Shown):
     """Tables of one degree d on the unit interval.
 
     ``nodes`` (d + 1,) Lobatto points and ``node_weights`` their quadrature; ``points`` (d,) Gauss points and
@@ -40,8 +40,6 @@ class Basis:
     highest: Array
     barycentric: Array
     constant: float
-
-    __repr__ = shown
 
     @functools.cached_property
     def round_off(self) -> float:

@@ -24,7 +24,7 @@ from contin.levels import CORRECTED, LOCATED, MOST_STEPS, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 from contin.linalg.condensation import Factorization
 from contin.linalg.convergence import CHORD, CHORDS, CONVERGED, DIVERGES, FAR, FRESH, STAGNATES, judge_update, subtract
-from contin.text import shown
+from contin.text import Shown
 
 #: Part of an update that must change the next one by half of that part at least. Ten times larger, strongly nonlinear equations
 #: count as noise; a thousand times smaller, what is left of an update above the tolerance would.
@@ -59,7 +59,7 @@ class Newton(checks.Named):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Corrected:
+class Corrected(Shown):
     """A corrected point.
 
     - ``x`` (ndarray, shape (size,))
@@ -77,8 +77,6 @@ class Corrected:
     error: float
     tangent: Array | None = None
     singular: bool = False
-
-    __repr__ = shown
 
 
 def correct(

@@ -15,11 +15,11 @@ from contin.arrays import Array, Numbers
 from contin.core.newton import linearized
 from contin.core.protocol import Discretization, inner
 from contin.linalg.blocks import Factors
-from contin.text import shown
+from contin.text import Shown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Linearization:
+class Linearization(Shown):
     """The tangent of a curve at a point, and the factored matrix [F_x; row] right there that it came from.
 
     - ``tangent`` (ndarray, shape (size,)): Unit tangent.
@@ -30,8 +30,6 @@ class Linearization:
     tangent: Array
     sign: float
     factors: Factors | None = None
-
-    __repr__ = shown
 
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
@@ -173,7 +171,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Event(checks.Named):
+class Event(checks.Named, Shown):
     """A function of a trial point whose zeros are special points.
 
     Attributes
@@ -235,8 +233,6 @@ class Event(checks.Named):
     value: float | None = None
     normal_form: Callable[..., Numbers] | None = None
     still: float = 0.0
-
-    __repr__ = shown
 
     def __post_init__(self) -> None:
         checks.fields(self)

@@ -23,7 +23,7 @@ from contin.core.step import Reason, State, Stop, located, settled
 from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.levels import CORRECTED, LOCATED, MOST_HALVINGS, ROUGH
-from contin.text import shown
+from contin.text import Shown
 
 #: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
 _IDLE = 1e3
@@ -163,7 +163,7 @@ Place = tuple[float, Trial]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SpecialPoint:
+class SpecialPoint(Shown):
     """A point located inside a step.
 
     - ``at`` (float): Distance from the beginning of the step, along the tangent there.
@@ -194,8 +194,6 @@ class SpecialPoint:
     is_located: bool = True
     slope: float = math.nan
     coarse: SpecialPoint | None = None
-
-    __repr__ = shown
 
     @property
     def full_name(self) -> str:

@@ -16,7 +16,7 @@ from contin.errors import ProblemError, warn
 from contin.results import plot
 from contin.results.marks import Axes, html_table
 from contin.results.point import Point
-from contin.text import ROWS, meant, shown
+from contin.text import ROWS, Shown, meant
 
 
 @dataclass
@@ -224,8 +224,8 @@ class Branch:
         return f"<div>{''.join(parts)}{_paragraphs(self.notes)}</div>"
 
 
-@dataclass
-class Junction:
+@dataclass(repr=False)
+class Junction(Shown):
     """A branch point, Hopf point or period doubling of a diagram: the point, its depth, and which half-branches were followed.
 
     At Hopf points and period doublings the second branch has one half: the other one is the same cycles, half a period later.
@@ -238,8 +238,6 @@ class Junction:
     taken: list[dict[int, int]]
     failed: list[tuple[int, int, str]] = field(default_factory=list)
     also: list[Point] = field(default_factory=list)
-
-    __repr__ = shown
 
 
 @dataclass

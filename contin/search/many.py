@@ -18,7 +18,7 @@ from contin.boundary.statement import BoundaryValueProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ContinError, ProblemError
 from contin.problems.statement import is_importable
-from contin.text import shown
+from contin.text import Shown
 from contin.threads import MOST
 
 #: Sets of values that a process takes at a time: handing over takes .03 ms a set, .1 ms one at a time. With ten times more,
@@ -30,15 +30,13 @@ _PACKAGE = str(Path(__file__).parents[1])
 _KEPT = 8
 
 
-@dataclass(frozen=True)
-class Row:
+@dataclass(frozen=True, repr=False)
+class Row(Shown):
     """What a function made of a problem at one set of values: the ``result``, or a ``failure``, a sentence ("" without one)."""
 
     values: Mapping[str, float]
     result: Any = None
     failure: str = ""
-
-    __repr__ = shown
 
 
 @checks.arguments
