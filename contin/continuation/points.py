@@ -125,8 +125,11 @@ IndexChange = tuple[int | None, int | None]
 
 def begun_at(origin: Point | None, first: SpecialPoint) -> SpecialPoint:
     """Return the first point of a run with what is known of the simple branch point that it is: its details and errors."""
-    trial, known = first.trial, finding_of(origin and origin.details)
-    if origin is None or not isinstance(known, BranchPoint) or origin.system is not trial.system or (origin.x != trial.x).any():
+    trial = first.trial
+    if origin is None or origin.system is not trial.system or (origin.x != trial.x).any():
+        return first  # without a look at the details, which take a normal form at a Hopf point
+    known = finding_of(origin.details)
+    if not isinstance(known, BranchPoint):
         return first
     return dataclasses.replace(first, details=known.along(trial.system, trial.tangent), errors=origin.errors or None)
 
