@@ -18,7 +18,7 @@ from contin.errors import ProblemError
 from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import BranchPoint
 from contin.events.corner import zeros
-from contin.events.labelled import Stability, contradiction, finding_of, nullity_of
+from contin.events.labelled import Stability, contradiction, finding_of, located_details, nullity_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import refined
 from contin.events.usual import with_normal_form
@@ -125,11 +125,8 @@ IndexChange = tuple[int | None, int | None]
 
 def begun_at(origin: Point | None, first: SpecialPoint) -> SpecialPoint:
     """Return the first point of a run with what is known of the simple branch point that it is: its details and errors."""
-    trial = first.trial
-    if origin is None or origin.system is not trial.system or (origin.x != trial.x).any():
-        return first  # without a look at the details, which take a normal form at a Hopf point
-    known = finding_of(origin.details)
-    if not isinstance(known, BranchPoint):
+    trial, known = first.trial, finding_of(origin and located_details(origin))
+    if origin is None or not isinstance(known, BranchPoint) or origin.system is not trial.system or (origin.x != trial.x).any():
         return first
     return dataclasses.replace(first, details=known.along(trial.system, trial.tangent), errors=origin.errors or None)
 

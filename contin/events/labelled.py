@@ -83,10 +83,15 @@ def finding_of(details: object) -> Finding:
     return details if isinstance(details, Finding) else _NOTHING
 
 
+def located_details(point: Any) -> Any:
+    """Return the details of a point as its location has found them: a normal form is computed when these are first read."""
+    told = vars(point).get("_told")
+    return point.details if told is None else told.args[0].details
+
+
 def frequency_of(point: Any) -> float | None:
-    """Return the frequency of a Hopf or torus bifurcation, known without its normal form; None where stored without it."""
-    told = vars(point).get("_told")  # makes the details with the normal form of the point that was located
-    details = point.details if told is None else told.args[0].details
+    """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
+    details = located_details(point)
     return float(details["frequency"]) if isinstance(details, dict) and "frequency" in details else None
 
 

@@ -15,7 +15,7 @@ from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Trial
 from contin.errors import ProblemError
-from contin.events.labelled import finding_of
+from contin.events.labelled import finding_of, located_details
 from contin.levels import LOCATED
 from contin.problems.statement import declared
 from contin.text import exact_text
@@ -63,7 +63,7 @@ class Record:
     @property
     def is_simple_branch_point(self) -> bool:
         """Two branches cross there, and their tangents are known."""
-        return finding_of(self.details).is_simple_branch_point
+        return finding_of(located_details(self)).is_simple_branch_point
 
 
 def system_of(point: Record, what: str) -> System:
