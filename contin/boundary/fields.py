@@ -5,10 +5,8 @@ The characteristic matrix A - z B of a steady state of fields, and its forms: Re
 On the mesh B x' = F(x), so that w.B v = 1 of the critical vectors (`contin.events.normal_forms`). The mean of |v|^2 over the
 domain is one, of the states whose rates occur.
 
-Steady states of fields over one coordinate: boundary value problems of which some equations contain rates in time.
-
-With U' = rhs(t, U, p) + M U_t, where M (n, n) has entries in the rows of a few equations only, a perturbation that grows as
-exp(z t) solves, on the mesh of the steady state,
+Steady states solve boundary value problems: with U' = rhs(t, U, p) + M U_t, where M (n, n) has entries in the rows of a few
+equations only, a perturbation that grows as exp(z t) solves, on the mesh of the steady state,
 
     A v = z B v,        B = P S,
 

@@ -24,7 +24,7 @@ from contin.collocation.corners import NOWHERE, Selections, Switching, breaks_of
 from contin.collocation.defect import Defect
 from contin.collocation.mesh import MeshControl, adapted_mesh, basis, halved, interpolation, moved_to_breaks, near
 from contin.collocation.newton import Codes, Values, Workspace, codes_of, linearize_on_mesh, workspace
-from contin.collocation.projection import Projections, projections
+from contin.collocation.projection import Projections, no_projections
 from contin.core.protocol import Carrier, Discretization
 from contin.core.step import State, Stop
 from contin.core.system import Composed, Inputs, Scales, Term
@@ -654,11 +654,10 @@ class Collocation(Composed):
         """
         return np.empty((0, self.size)), np.empty(0)
 
-    @functools.cached_property
+    @property
     def projections(self) -> Projections:
         """The room in which a kernel evaluates projection conditions: here none."""
-        none, field = np.zeros((self._n, len(self.parameters))), self._field.load()
-        return projections(field, field, (0, 0), (none, none), self._free)
+        return no_projections()
 
     def holds(self, x: Array, tolerance: float) -> bool:
         """Return whether a solution with another reference is one with this one: it meets the linear conditions."""

@@ -13,6 +13,7 @@ which Newton's method solves. Its updates D, and the derivatives of Y by paramet
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -20,7 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.functions.interpreter import Loaded, Points, run_loaded
+from contin.functions.interpreter import Loaded, Points, load, run_loaded
+from contin.functions.program import Inputs, program
+from contin.functions.tape import Tape
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.levels import MOST_UPDATES
@@ -98,6 +101,13 @@ def projections(slopes: Loaded, along: Loaded, counts: Sequence[int], places: Se
         sum(counts), first, last, empty(sum(counts)), slopes, along, np.zeros(points), empty((points, n)), empty((1, n)),
         np.zeros((points, n, n)), empty((0, n)), empty((points, 0)), empty((n, n)), empty((n, n)), empty(n),
     )  # fmt: skip
+
+
+@functools.cache
+def no_projections() -> Projections:
+    """Return the room of all systems without such conditions: kernels see that there are none, and leave it."""
+    none = load(program(Tape(), [], Inputs({}, {}, {})))
+    return projections(none, none, (0, 0), [np.empty((1, 0))] * 2, np.empty(0, dtype=np.int64))
 
 
 @helper

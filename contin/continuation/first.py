@@ -107,19 +107,17 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
 
     Returns x and the row that was held.
     """
-    fixed = np.zeros(system.size)
-    fixed[system.parameter_index(primary)] = 1.0
+    fixed = np.eye(1, system.size, system.parameter_index(primary))[0]
     rows = generator("first").standard_normal((DRAWS, system.size)) * np.sqrt(system.weights)
-    failed: ConvergenceError | None = None
+    failed = list[ConvergenceError]()
     # at a branch point these are singular; beside it a row is, too, that passes two branches at equal distances
     beside = ((x + APART * row / np.abs(row).max(), row) for row in rows)
     for start, row in ((x, fixed), (x, rows[0]), *beside):
         try:
             return correct(system, start, row, row @ start, newton, sizes=system.magnitudes).x, row
         except ConvergenceError as error:
-            failed = failed or error
-    assert failed is not None
-    raise failed
+            failed.append(error)
+    raise failed[0]
 
 
 def begins_outside(trial: Trial, settings: Settings, own: Sequence[Event], singular: bool) -> Stop | None:

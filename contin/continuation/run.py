@@ -133,7 +133,7 @@ class Continuation:
         state, settings = self.state, self._settings
         if self._steps.fold is None or not STILL < abs(state.tangent[state.system.parameter_index(self.primary)]) < CLEAR:
             settings = self._path
-        if settings != self._steps.settings:
+        if settings is not self._steps.settings:
             self._steps = dataclasses.replace(self._steps, settings=settings)
             self._meshes = dataclasses.replace(self._meshes, steps=self._steps)
 

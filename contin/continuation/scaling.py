@@ -68,9 +68,8 @@ def scaled(
 ) -> tuple[Discretization, Array]:
     """Return the system with sizes of states and parameters taken from a first point, and x for it.
 
-    ``linear`` is the linearization at x, bordered by ``row``.
-
-    Unchanged where it has sizes already, or where all are of order one.
+    ``linear`` is the linearization at x, bordered by ``row``. Unchanged where it has sizes already, or where all are of order
+    one.
     """
     if system.on_curve or not system.scales.are_one:
         return system, x
@@ -129,7 +128,8 @@ class _FirstPoint:
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
         self.tangent = np.zeros_like(x) if self._stands_still(rate) else linear.tangent / rate
-        self._random = draws.generator("scaling")
+        self._random, count, size = draws.generator("scaling"), len(system.problem.states), system.state_size
+        self._names = np.concatenate([np.arange(size) % count, np.arange(count, count + x.size - size)])  # of each unknown
         self._others: list[tuple[Array, Any, float]] = []
 
     def _stands_still(self, rate: float) -> bool:
@@ -225,14 +225,14 @@ class _FirstPoint:
         where only their terms move.
         """
         while len(self._others) <= number:
-            x = self._rounded(self.x)
+            x = draws.rounded(self._random, self.x)
             self._others.append((x, self.system.linearize(x, (self.row,))[1], 1 + self._random.random()))
         return self._others[number]
 
-    def _error(self, found: Array, again: Callable[[int], Array], draws: int = draws.DRAWS) -> Array:
+    def _error(self, found: Array, again: Callable[[int], Array], times: int = draws.DRAWS) -> Array:
         """Return the round-off of what was found, by name, from computing it again; more often where it may be all there is."""
         size, error = self.system.largest(found), np.zeros(1)
-        for number in range(draws):
+        for number in range(times):
             with np.errstate(all="ignore"):
                 error = np.fmax(error, UNITS * self.system.largest(found - again(number)))
             if not np.any((size > error) & ~((size > _CLEAR * error) & (error > 0))):
@@ -255,20 +255,20 @@ class _FirstPoint:
         for order in (2, 3):
             yield self._solved([self.tangent] * order) / math.factorial(order)
 
-    def _solved(self, directions: Sequence[Array], draws: int = draws.DRAWS) -> Array:
+    def _solved(self, directions: Sequence[Array], times: int = draws.DRAWS) -> Array:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
 
         def again(number: int) -> Array:
             x, factors, longer = self._beside(number)
-            rounded = {id(direction): self._rounded(longer * direction) for direction in directions}
+            rounded = {id(direction): draws.rounded(self._random, longer * direction) for direction in directions}
             right = self.system.along(x, [rounded[id(direction)] for direction in directions])
-            return factors.solve(self._rounded(np.append(right, 0.0))) / longer ** len(directions)
+            return factors.solve(draws.rounded(self._random, np.append(right, 0.0))) / longer ** len(directions)
 
         with np.errstate(all="ignore"):
             found = self._factors.solve(np.append(self.system.along(self.x, directions), 0.0))
         if not np.isfinite(found).all():
             return np.zeros_like(found)
-        return self._kept(found, self.system.largest(found) > self._error(found, again, draws))
+        return self._kept(found, self.system.largest(found) > self._error(found, again, times))
 
     def _modes(self, known: Array) -> Iterator[_Mode]:
         """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
@@ -317,7 +317,7 @@ class _FirstPoint:
 
     def _changed(self, v: Array, direction: Array, order: int) -> Array:
         """Return F_x^-1 of the change of F_x v in a direction, of first or second order: one of many iterations."""
-        return self._solved([*[direction] * order, v], draws=1) / math.factorial(order)
+        return self._solved([*[direction] * order, v], times=1) / math.factorial(order)
 
     def _mode(self, v: Array, direction: Array, rate: float, order: int) -> _Mode:
         """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
@@ -334,7 +334,7 @@ class _FirstPoint:
                 mode, value = parted
                 v, rate, image = mode, abs(value), self._changed(mode, direction, order) / abs(value)
                 missed = image - math.copysign(1.0, value) * mode
-        noise = self._changed(self._rounded(v), direction, order) / rate - image
+        noise = self._changed(draws.rounded(self._random, v), direction, order) / rate - image
         errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
         found = self._kept(mode, self.system.largest(mode) > errors)
         alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
@@ -450,14 +450,9 @@ class _FirstPoint:
             error_of_tangent = np.fmax(error_of_tangent, system.largest(turned - self.tangent))
         return error, error_of_tangent
 
-    def _rounded(self, v: Array) -> Array:
-        """Return a vector changed by one unit in the last place, up or down."""
-        return draws.rounded(self._random, v)
-
     def _kept(self, v: Array, kept: Pattern | Array) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""
-        count = len(self.system.problem.states)
-        return v * np.concatenate([np.tile(kept[:count], self.system.state_size // count), kept[count:]])
+        return v * kept[self._names]
 
 
 def _has_settled(numbers: Sequence[float]) -> bool:

@@ -243,6 +243,8 @@ class System(Discretization):
     def _batch(self, name: str, rows: Sequence[str] = ()) -> Batch:
         """Return some of the functions, compiled, of scaled inputs; ``rows`` name the sizes of its values."""
         batch: Batch = self.problem.batch(name)
+        if self.scales.are_one:
+            return batch
         sizes, states = {"states": self.scales.states, **self.scales.rows}, self.scales.states
         values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
         ends = [states] if batch.signature.ends else []
@@ -267,14 +269,13 @@ class System(Discretization):
 
     def magnitudes(self, x: Array) -> Array:
         """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""
-        count = len(self.problem.states)
-        largest = self.largest(x)
+        count, largest = len(self.problem.states), self.largest(x)
         return np.append(np.tile(largest[:count], self.state_size // count), largest[count:])
 
     def largest(self, v: Array) -> Array:
         """Return the largest absolute value of each state, and that of each free parameter, of a vector like x."""
-        states = np.abs(v[: self.state_size]).reshape(-1, len(self.problem.states)).max(axis=0, initial=0.0)
-        return np.append(states, np.abs(v[self.state_size :]))
+        sizes, count = np.abs(v), self.state_size
+        return np.concatenate([sizes[:count].reshape(-1, len(self.problem.states)).max(axis=0, initial=0.0), sizes[count:]])
 
     def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[Self, Array]:
         """Return the same with the rounds that angles make in x, unless they are given, and a continuous x."""
