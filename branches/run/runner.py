@@ -60,7 +60,7 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
             begun = _begun(scene, path if resume else None)
             outcome, stop, writer = _followed(begun, path, display, Interruption())
         with contextlib.closing(writer):
-            display.summary(begun.stages, writer.events(), writer.count, time.perf_counter() - began, path, outcome, stop)
+            display.summary(begun.stages, writer.rows["events"], writer.count, time.perf_counter() - began, path, outcome, stop)
             for note in writer.notes:
                 display.note(note)
     return outcome
@@ -96,7 +96,7 @@ def compute_scene(scene: Scene, display: Display) -> Computed:
         outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""
-        return Computed(writer.image(), outcome, str(stop or ""), reason, scene, writer.points(), writer.events(), writer.notes)
+        return Computed(writer.image(), outcome, str(stop or ""), reason, scene, *writer.rows.values(), writer.notes)
 
 
 @dataclasses.dataclass(eq=False, repr=False)
@@ -138,7 +138,7 @@ def _followed(begun: _Begun, path: Path | None, display: Display, interruption: 
     if stages[0].starts_others:
         writer.kept = _Kept(labelled)
     outcome, stop = "complete", None
-    display.begin(stages[0].scene, writer.count, len(writer.events()))
+    display.begin(stages[0].scene, writer.count, len(writer.rows["events"]))
     with interruption:
         for stage in stages[len(labelled) - 1 :]:
             if stage.number > len(labelled):
