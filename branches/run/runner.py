@@ -9,7 +9,9 @@ from __future__ import annotations
 import _thread
 import contextlib
 import dataclasses
+import functools
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -18,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from branches.run.display import Display
 from branches.scene.fields import ConfigError, Scene
@@ -34,6 +36,11 @@ from contin.lowlevel import Continuation, Stop
 
 if TYPE_CHECKING:
     from branches.store.branch import StoredBranch
+
+
+#: The libraries of BLAS, found once without and once with SciPy's own, which takes a millisecond. They use one thread: more
+#: slow down matrices as small as the index's, and change their bits.
+_blas = functools.cache(lambda with_scipy: ThreadpoolController())
 
 
 def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool = False, overwrite: bool = False) -> str:
@@ -56,7 +63,7 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
             display.note(f"{path} is complete already ({done}); nothing to do")
             return "complete"
         prepare(path)
-        with threadpool_limits(1, "blas"):  # more threads slow down matrices as small as the index's, and change their bits
+        with _blas("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
             begun = _begun(scene, path if resume else None)
             outcome, stop, writer = _followed(begun, path, display, Interruption())
         with contextlib.closing(writer):
@@ -92,7 +99,7 @@ class Computed:
 
 def compute_scene(scene: Scene, display: Display) -> Computed:
     """Return the branch of ``scene``; no file is written. Ctrl-C is not caught here: the points so far would be lost."""
-    with threadpool_limits(1, "blas"):
+    with _blas("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
         outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""
