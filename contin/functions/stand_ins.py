@@ -162,7 +162,7 @@ class _Copies:
     def _copy(self, function: types.FunctionType) -> Any:
         if id(function) in self._done:
             return self._done[id(function)]
-        if _catches(function.__code__):
+        if _has(function.__code__, "PUSH_EXC_INFO"):  # not those of generators, which pass exceptions on
             raise Unrecordable(f"{function.__name__} catches exceptions (try, with)")
         scope: dict[str, Any] = {"__name__": function.__module__, "__builtins__": builtins}
         cells = tuple(types.CellType() for _ in function.__closure__ or ())
@@ -266,9 +266,9 @@ class _Object:
 
 
 @functools.lru_cache(maxsize=1024)
-def _catches(code: types.CodeType) -> bool:
-    """Return whether a function handles exceptions: not those of generators, and from Python 3.12 on of lists, that pass on."""
-    return any(instruction.opname == "PUSH_EXC_INFO" for instruction in dis.get_instructions(code))
+def _has(code: types.CodeType, name: str) -> bool:
+    """Return whether a function has an instruction of this name, but for what is defined in it."""
+    return any(instruction.opname == name for instruction in dis.get_instructions(code))
 
 
 @functools.lru_cache(maxsize=1024)
@@ -283,8 +283,11 @@ def _is_fixed(value: object) -> bool:
     """Return whether a value cannot change: what a function reads is looked at by itself."""
     if isinstance(value, (types.ModuleType, types.BuiltinFunctionType)):
         return str(getattr(value, "__module__", None) or value.__name__).partition(".")[0] in _FOREIGN
-    plain = value is None or isinstance(value, (types.FunctionType, types.CodeType, float, int, str, complex, np.ufunc))
-    return plain or (isinstance(value, tuple) and all(map(_is_fixed, value)))
+    if isinstance(value, types.CodeType):  # what it imports when it is called may be any module
+        return not _has(value, "IMPORT_NAME") and all(map(_is_fixed, value.co_consts))
+    if isinstance(value, (tuple, frozenset)):
+        return all(map(_is_fixed, value))
+    return value is None or isinstance(value, (types.FunctionType, float, int, str, bytes, complex, np.ufunc))
 
 
 def _may_hold_functions(value: object) -> bool:
@@ -406,10 +409,6 @@ class _Complex(metaclass=_Kind):
     of = staticmethod(lambda x=0.0, y=0.0: complex(x, y) if recorded(x, y) is None else x + 1j * y)
 
 
-def _of_complex(name: str) -> Callable[[Any], Any]:
-    return lambda z: function_of_complex(name, complex_number(z.tape, z))
-
-
 #: Functions of recorded numbers by the functions that they stand for: operations under their own names, and others.
 _OF_NUMBERS: dict[Any, Callable[..., Any]] = {getattr(math, name): operation(name) for name in TABLE if hasattr(math, name)}
 _OF_NUMBERS |= {
@@ -422,7 +421,8 @@ _OF_NUMBERS |= {
     math.fmod: lambda x, y: x - y * operation("trunc")(x / y), cmath.phase: FUNCTIONS[np.angle],
     cmath.rect: lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi)),
 }  # fmt: skip
-_OF_NUMBERS |= {getattr(cmath, name): _of_complex(name) for name, each in TABLE.items() if each.pair}
+_OF_NUMBERS |= {getattr(cmath, name): lambda z, name=name: function_of_complex(name, complex_number(z.tape, z))
+                for name, each in TABLE.items() if each.pair}  # fmt: skip
 #: Functions of NumPy that make an array of what they are given, and those that make a new one.
 _CONVERTERS = (np.array, np.asarray, np.asanyarray, np.ascontiguousarray)
 _MAKERS = (np.zeros, np.empty, np.ones, np.full, np.zeros_like, np.empty_like, np.ones_like, np.full_like, *_CONVERTERS)
