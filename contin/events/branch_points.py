@@ -59,20 +59,29 @@ class BranchPointSearch:
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
         """How many branch points the step passes, and whether that is clear."""
+        kept = self.arc.before.factors is not None  # bordered by a row of the step before, along which the branch goes on as well
+        counted = self._counted(kept)
+        if kept and counted != (0, True):  # where it is expected is told by the step alone, however the run began
+            self.arc.before.refactor(self.arc.state.row)
+            counted = self._counted(False)
+        return counted
+
+    def _counted(self, kept: bool) -> tuple[int, bool]:
+        """Return the count, with the factors at the start of the step that are kept, or with new ones."""
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
-        row, size = state.row, state.system.size
-        same = same_sign(before.sign, trial.sign)
-        kept = before.factors is not None  # bordered by a row of the step before, along which the branch goes on as well
-        if not kept:
-            before.refactor(row)
+        size, same = state.system.size, same_sign(before.sign, trial.sign)
+        if before.factors is None:
+            if same and state.system.cannot_branch(self.arc):
+                return 0, True
+            before.refactor(state.row)
         known = known_quotients(before.factors, trial.factors, size)
         if known is not None and (decided := self._decided(known, shares(known))):
             return decided
-        if same and state.system.cannot_branch(self.arc):
+        if kept and same and state.system.cannot_branch(self.arc):
             return 0, True
         if known is None:
             ends = {0.0: before.factors, 1.0: trial.factors}
-            along = quotients_along(functools.cache(lambda part: ends.get(part) or self._bordered(part, row[None])))
+            along = quotients_along(functools.cache(lambda part: ends.get(part) or self._bordered(part, state.row[None])))
             if along is not None and (decided := self._decided(*along)):
                 return decided
             if same and changes_little(before.factors, trial.factors, size):
@@ -80,7 +89,7 @@ class BranchPointSearch:
             if self._without_smallest is not None:
                 return self._without_smallest
         if kept:
-            before.refactor(row)
+            return 0, False
         values = quotients(before.factors, trial.factors, size)
         count, clear = crossings(values)
         if (count > 1 or not clear) and self._without_smallest is not None:
