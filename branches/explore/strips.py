@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import collections
 import contextlib
-import functools
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,13 +15,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from branches.draw.strip import steady
 from branches.draw.structure import Fixture, Structure, parts_of
 from branches.explore.packing import column, compressed
 from branches.explore.profiles import MOST_NODES, marked
 from branches.run.barriers import falls, told
+from branches.run.blas import one_thread
 from branches.scene.closed import ClosedScene, and_nu, law_of
 from branches.scene.columns import NUMBER
 from branches.scene.labels import ON_PAGE, START, kind_of, label_of
@@ -70,13 +69,8 @@ def branch_of(path: Path, slow: bool = True) -> dict:
     With ``slow``, it holds what takes seconds: the ways down from folds that a stable strip reaches, and the exact solution of
     a law that the page does not know. Raises StoreError where the file cannot be read, or it holds fewer than two points.
     """
-    with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
+    with one_thread():
         return _branch(path, read_kind(path, CLOSED), slow)
-
-
-@functools.cache
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 def _branch(path: Path, branch: StoredBranch, slow: bool) -> dict:

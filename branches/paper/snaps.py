@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits
-
 from branches.paper.page import Row, Section, keep, new_figure
+from branches.run.blas import one_thread
 from ribbon_model.descent import KICK, METRICS, PAST, SEGMENTS, Rest, let_go, past
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.linear import energy_interval
@@ -51,7 +50,7 @@ class Start:
 def snaps(folder: Path) -> Section:
     """The table 'from, at kappa_n, snaps to', and the shapes on the way of three of them."""
     rows, films = [], []
-    with threadpool_limits(1, "blas"):  # the matrices are small
+    with one_thread():
         for start in _starts():
             signs = (1, -1) if start.buckled else (1,)  # on a circle one is a shift of the other
             runs = [(metric, sign, *let_go(start.strip, metric, sign)) for metric in METRICS for sign in signs]

@@ -118,12 +118,11 @@ def _with_stability(scene, path):
 
 
 def _tell_barriers(path, display, quiet: bool) -> None:
-    from threadpoolctl import threadpool_limits
-
     from branches.run.barriers import report
+    from branches.run.blas import one_thread
     from branches.store.read import read_branch
 
-    with threadpool_limits(1, "blas"):  # the matrices are small
+    with one_thread():
         lines = report(read_branch(path), quiet)
     if lines:
         display.note("\n".join(lines))

@@ -9,9 +9,7 @@ from __future__ import annotations
 import _thread
 import contextlib
 import dataclasses
-import functools
 import signal
-import sys
 import tempfile
 import threading
 import time
@@ -20,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
+from branches.run.blas import one_thread
 from branches.run.display import Display
 from branches.scene.fields import ConfigError, Scene
 from branches.scene.labels import START
@@ -36,11 +34,6 @@ from contin.lowlevel import Continuation, Stop
 
 if TYPE_CHECKING:
     from branches.store.branch import StoredBranch
-
-
-#: The libraries of BLAS, found once without and once with SciPy's own, which takes a millisecond. They use one thread: more
-#: slow down matrices as small as the index's, and change their bits.
-_blas = functools.cache(lambda with_scipy: ThreadpoolController())
 
 
 def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool = False, overwrite: bool = False) -> str:
@@ -63,7 +56,7 @@ def run_scene(scene: Scene, path: str | Path, display: Display, *, resume: bool 
             display.note(f"{path} is complete already ({done}); nothing to do")
             return "complete"
         prepare(path)
-        with _blas("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
+        with one_thread():
             begun = _begun(scene, path if resume else None)
             outcome, stop, writer = _followed(begun, path, display, Interruption())
         with contextlib.closing(writer):
@@ -99,7 +92,7 @@ class Computed:
 
 def compute_scene(scene: Scene, display: Display) -> Computed:
     """Return the branch of ``scene``; no file is written. Ctrl-C is not caught here: the points so far would be lost."""
-    with _blas("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
+    with one_thread():
         outcome, stop, writer = _followed(_begun(scene, None), None, display, Interruption(()))
     with contextlib.closing(writer):
         reason = str(stop.reason) if stop else ""

@@ -247,7 +247,8 @@ def _extend(group, name: str, rows):
         data = h5py.h5d.open(group.id, name.encode())
         start, *width = data.shape
         data.set_extent((start + len(rows), *width))
-        (place := data.get_space()).select_hyperslab((start, *(0 for _ in width)), rows.shape)
+        place = data.get_space()
+        place.select_hyperslab((start, *(0 for _ in width)), rows.shape)
         data.write(h5py.h5s.create_simple(rows.shape), place, np.ascontiguousarray(rows))
 
 

@@ -88,12 +88,11 @@ def _check(asked: dict, natural_radius: float | None) -> None:
 
 
 def _answer(strip: Strip, asked: dict) -> None:
-    from threadpoolctl import threadpool_limits
-
+    from branches.run.blas import one_thread
     from branches.strip import report  # .5 s: not for a mistake in the dimensions
 
     turns, quiet = asked["turns"] or 3, asked["quiet"]
-    with threadpool_limits(1, "blas"):  # the matrices are small
+    with one_thread():
         if asked["distance"] is not None:
             from branches.strip.arch import answer
 
