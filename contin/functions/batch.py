@@ -26,6 +26,7 @@ from contin.errors import InterpretedWarning, ProblemError, warn
 from contin.functions import derivatives, round_off
 from contin.functions.interpreter import LANES, Loaded, load, run
 from contin.functions.outcomes import Outcomes, frozen
+from contin.functions.primitives import ANALYTIC
 from contin.functions.program import Inputs, Program, Slope, program
 from contin.functions.recording import Recording, checked, sized
 from contin.functions.signature import ABSENT, Signature, UserFunction
@@ -51,12 +52,6 @@ class Request(NamedTuple):
 
 #: A program, the number of its values, and the shape of its Jacobian at one point; empty without one.
 _Made = tuple[Program, int, tuple[int, ...]]
-
-#: Operations that are analytic wherever they are finite: roots, logarithms and powers are not at 0.
-_ANALYTIC = {
-    "input", "constant", "add", "sub", "mul", "div", "neg", "sum", "dot", "linear", "product",
-    "exp", "exp2", "expm1", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan",
-}  # fmt: skip
 
 
 class Recorded:
@@ -134,7 +129,7 @@ class Recorded:
     def is_analytic(self) -> bool:
         """Values are analytic functions wherever they are finite: no operation is one that is not."""
         tape = self.recording.tape
-        return {tape.operations[place].name for place in tape.needed(self.recording.results)} <= _ANALYTIC
+        return {tape.operations[place].name for place in tape.needed(self.recording.results)} <= ANALYTIC
 
     def entries(self, inputs: tuple[int, ...]) -> tuple[Indices, Indices]:
         """Return values and columns of the entries of the Jacobian that may differ from zero."""

@@ -363,5 +363,10 @@ TABLE: dict[str, Primitive] = {
         lambda tape, data, xs, r: [None, *data[0].slopes_of_least(tape, xs[1:])],
     ),
 }  # fmt: skip
+#: Those that are analytic wherever they are finite: roots, logarithms and powers are not at 0.
+ANALYTIC = {
+    "input", "constant", "add", "sub", "mul", "div", "neg", "sum", "dot", "linear", "product",
+    "exp", "exp2", "expm1", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan",
+}  # fmt: skip
 #: Functions of the C library of two numbers.
 OF_TWO = ("pow", "atan2", "hypot", "mod")
