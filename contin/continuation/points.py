@@ -196,7 +196,8 @@ def told(found: SpecialPoint, arclength: float, index: Event | None, change: Ind
         del vars(point)["functionals"]
     if found.coarse is not None:
         del vars(point)["name"], vars(point)["details"]
-        vars(point)["_told"] = functools.partial(_with_normal_form, _kept(found), _kept(found.coarse))
+        later = functools.partial(_with_normal_form, _kept(found), _kept(found.coarse))
+        vars(point)["_told"] = (found.details, later)  # what is known of it, and what computes name and details when first read
     return point
 
 

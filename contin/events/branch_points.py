@@ -59,7 +59,7 @@ class BranchPointSearch:
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
         """How many branch points the step passes, and whether that is clear."""
-        kept = self.arc.before.factors is not None  # bordered by a row of the step before, along which the branch goes on as well
+        kept = self.arc.before.factors is not None  # bordered by a row of the step before: the branch goes on along it, too
         counted = self._counted(kept)
         if kept and counted != (0, True):  # where it is expected is told by the step alone, however the run began
             self.arc.before.refactor(self.arc.state.row)

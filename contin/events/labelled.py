@@ -86,7 +86,7 @@ def finding_of(details: object) -> Finding:
 def located_details(point: Any) -> Any:
     """Return the details of a point as its location has found them: a normal form is computed when these are first read."""
     told = vars(point).get("_told")
-    return point.details if told is None else told.args[0].details
+    return point.details if told is None else told[0]
 
 
 def frequency_of(point: Any) -> float | None:

@@ -51,7 +51,7 @@ class Record:
         if name == "functionals" and "system" in known:
             known[name] = Trial.without_tangent(self.system, self.x).functionals
         elif name in ("name", "details") and "_told" in known:
-            known["name"], known["details"] = known.pop("_told")()
+            known["name"], known["details"] = known.pop("_told")[1]()
         else:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return known[name]
