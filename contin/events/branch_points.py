@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -60,14 +61,15 @@ class BranchPointSearch:
     def count(self) -> tuple[int, bool]:
         """How many branch points the step passes, and whether that is clear."""
         kept = self.arc.before.factors is not None  # bordered by a row of the step before: the branch goes on along it, too
-        counted = self._counted(kept)
+        inside = functools.cache(lambda part: self._bordered(part, self.arc.state.row[None]))
+        counted = self._counted(kept, inside)
         if kept and counted != (0, True):  # where it is expected is told by the step alone, however the run began
             self.arc.before.refactor(self.arc.state.row)
-            counted = self._counted(False)
+            counted = self._counted(False, inside)
         return counted
 
-    def _counted(self, kept: bool) -> tuple[int, bool]:
-        """Return the count, with the factors at the start of the step that are kept, or with new ones."""
+    def _counted(self, kept: bool, inside: Callable[[float], Factors]) -> tuple[int, bool]:
+        """Return the count, with the factors at the start of the step that are kept, or with new ones, and those inside it."""
         state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         size, same = state.system.size, same_sign(before.sign, trial.sign)
         if before.factors is None:
@@ -81,7 +83,7 @@ class BranchPointSearch:
             return 0, True
         if known is None:
             ends = {0.0: before.factors, 1.0: trial.factors}
-            along = quotients_along(functools.cache(lambda part: ends.get(part) or self._bordered(part, state.row[None])))
+            along = quotients_along(lambda part: ends.get(part) or inside(part))
             if along is not None and (decided := self._decided(*along)):
                 return decided
             if same and changes_little(before.factors, trial.factors, size):
