@@ -106,6 +106,8 @@ class Continuation:
         self._notes = Notes(self.primary, self._path.mesh.tolerance, bool(settings.mesh.every))
         if conserved := getattr(system.solution.problem, "conserved", ""):
             self._notes.add(conserved)
+        if state is not None and state.previous_tangent is not None:
+            self.here().refactor(state.system.weights * state.previous_tangent)  # as the step before left them
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)

@@ -108,11 +108,13 @@ class Interrupts(Display):
 
 
 @pytest.mark.full
-def test_a_run_goes_on_in_a_stage_with_other_ends_to_the_same_bits(tmp_path, root, tables):
-    scene = load(root / "configs" / "open_release.yaml")
+@pytest.mark.parametrize(("name", "stage", "number"), [("open_release", 4, 2), ("network_portal", 2, 9)])
+def test_a_run_goes_on_in_a_later_stage_to_the_same_bits(tmp_path, root, tables, name, stage, number):
+    """With other ends, and where factors of the step before decide that no branch point is near."""
+    scene = load(root / "configs" / f"{name}.yaml")
     whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
     run_scene(scene, whole, Display(silent=True))
-    at = int(np.flatnonzero(read_branch(whole).points["stage"] == 4)[2])
+    at = int(np.flatnonzero(read_branch(whole).points["stage"] == stage)[number])
     assert run_scene(scene, parts, Interrupts(at)) == "interrupted"
     assert run_scene(scene, parts, Display(silent=True), resume=True) == "complete"
     assert tables(parts) == tables(whole)
