@@ -286,19 +286,19 @@ def _off(frame: Frame, attempt: Attempt, path: Path, number: int, half: float) -
     """Return how far a step ends from its prediction or, with ``half`` a step, from where the tangents at both ends lead.
 
     That is the trapezoidal rule: of a smooth branch it misses less than the prediction. Where Newton's method falls onto a
-    branch that crosses this one nearby, only the tangent may tell.
+    branch that crosses this one nearby, only the tangent may tell. In the first step states alone are compared by this rule
+    only: a prediction without curvature misses half of the way of states that begin at rest, however short the step is.
     """
     x, tangent, last, last_tangent = path.x[number - 1], path.tangents[number - 1], path.x[number], path.tangents[number]
     missed, of_states, first_size, last_size, cosine = 0.0, 0.0, 0.0, 0.0, attempt.judged[COSINE]
     for i in range(x.size):
         aim = attempt.guess[i] if half == 0 else x[i] + half * (tangent[i] + last_tangent[i] / cosine)
         missed += frame.weights[i] * (aim - last[i]) ** 2
-        if i == frame.states - 1:
-            of_states = missed
         if i < frame.states:
+            of_states = missed
             first_size += frame.weights[i] * tangent[i] ** 2
             last_size += frame.weights[i] * last_tangent[i] ** 2
-    if of_states > APART * APART:
+    if of_states > APART * APART and (half != 0 or bend_of(path, number) > 0):
         missed = max(missed, of_states / (_LOOSE * _LOOSE * max(first_size, last_size) + TINY))
     return math.sqrt(missed)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from contin import AlgebraicProblem, ConvergenceError, Newton
+from contin import AlgebraicProblem, ConvergenceError, Newton, solve, trace
 from contin.continuation.rules import judged, predict
 from contin.core.step import State, corrected, located, standing_at
 from contin.core.trial import Linearization, Trial
@@ -142,6 +142,13 @@ def test_states_that_stand_still_have_no_direction():
     state = standing_at(system, np.zeros(3), cone(system, 1e-3, 0.0), 0.1)
     trial = trial_at(system, np.zeros(3), cone(system, 1e-3, math.pi))
     assert judgement(state, trial).turn == pytest.approx(2e-3, rel=1e-5)
+
+
+def test_states_that_begin_at_rest_do_not_shorten_the_first_step():
+    """Of x = a^2 from a = 0 the tangent predicts x = 0 at the end of a step of any length."""
+    parabola = AlgebraicProblem(lambda u, p: (u.x - p.a**2,), ["x"], {"a": 0.0})
+    branch = trace(solve(parabola, [0.0]), free=["a"], step=0.05, max_points=1)
+    assert branch.points[-1]["a"] == pytest.approx(0.05, rel=1e-12)
 
 
 def test_a_tangent_that_is_not_a_number_has_no_turn():
