@@ -188,7 +188,7 @@ class MeshPolicy:
                 return dataclasses.replace(
                     state, system=system, x=x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
                 ), end
-            done = correct(system, x, row, row @ x, newton, linearize=True)
+            done = correct(system, x, row, row @ x, newton, within=np.inf)
             end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
             system.check_jumps(end.x, state, False)
         except ConvergenceError:

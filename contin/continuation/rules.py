@@ -192,13 +192,13 @@ def single_step(state: State, settings: Settings) -> Single:
 
 def predict(state: State, step: float, settings: Settings = Settings()) -> Array:
     """Return the guess at a distance ``step``: along the tangent, with the curvature known from the last step."""
-    return predicted(single_step(state, settings), step)
+    return predicted(single_step(state, settings), step)[0]
 
 
-def predicted(single: Single, step: float) -> Array:
-    """Return the same of a step whose room is at hand."""
+def predicted(single: Single, step: float) -> tuple[Array, float]:
+    """Return the same of a step whose room is at hand, and how far from it the end of the step is believed."""
     predict_step(single, step)
-    return single.attempt.guess
+    return single.attempt.guess, _ASTRAY * single.control.accuracy * step
 
 
 def judged(state: State, guess: Array, trial: Trial, step: float = math.inf, settings: Settings = Settings()) -> Judgement:

@@ -96,8 +96,8 @@ class Steps:
     def _made(self, state: State, step: float, near: Array | None) -> Made:
         """Return the end of a step, and what it is judged by."""
         single = self.room(state)
-        guess = predicted(single, step)
-        trial = corrected(state, guess if near is None else near, step, self.settings.newton)
+        guess, reach = predicted(single, step)
+        trial = corrected(state, guess if near is None else near, step, self.settings.newton, reach)
         if state.system.collapsed(state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         return trial, judged_as(single, trial, step)

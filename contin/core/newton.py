@@ -66,8 +66,7 @@ class Corrected(Shown):
     - ``factors`` (Factors): The last factorization, taken at an iterate before x.
     - ``iterations`` (int)
     - ``error`` (float): Estimated error left, the largest component relative to 1 + |x|.
-    - ``tangent`` (ndarray, shape (size,), or None): The unit tangent right at x, where it was asked for and is at hand; the
-      factors are from there, too.
+    - ``tangent`` (ndarray, shape (size,), or None): The unit tangent right at x where it was asked for; so are the factors.
     - ``singular`` (bool): F_x is singular at x, up to its error.
     """
 
@@ -81,7 +80,7 @@ class Corrected(Shown):
 
 def correct(
     system: Equations, guess: Sequence[float] | Array, row: Array | None = None, target: float | Array = 0.0,
-    newton: Newton = Newton(), factors: Factors | None = None, sizes: Sizes | None = None, linearize: bool = False,
+    newton: Newton = Newton(), factors: Factors | None = None, sizes: Sizes | None = None, within: float = 0.0,
 ) -> Corrected:  # fmt: skip
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
@@ -97,8 +96,9 @@ def correct(
     sizes : callable, optional
         ``sizes(x)`` returns the size of each unknown. Where it is given, the last update is also small relative to these, or as
         small as round-off of x allows: for unknowns that are not known to be of order one.
-    linearize : bool
-        The tangent right at the solution is wanted, if it costs no further call.
+    within : float
+        The tangent right at the solution is wanted, if it costs no further call, and no solution that is farther from the
+        guess. The first update tells its distance, in the weights of the system.
 
     Raises
     ------
@@ -122,9 +122,8 @@ def correct(
                 done = _chords(system, guess, row, target, newton, factors)
             if done is not None:
                 return done
-    done = None if work is None else _in_one_call(system, work, guess, row, target, newton, linearize)
-    stays = linearize and getattr(system, "on_curve", False)
-    return _newton(system, guess, row, target, newton, sizes, stays) if done is None else done
+    done = None if work is None else _in_one_call(system, work, guess, row, target, newton, within > 0)
+    return _newton(system, guess, row, target, newton, sizes, within) if done is None else done
 
 
 def linearized(system: Any, x: Array, row: Array) -> Corrected | None:
@@ -166,13 +165,13 @@ def _in_one_call(
 
 
 def _newton(
-    system: Equations, guess: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes | None, stays: bool
+    system: Any, guess: Array, row: Array | None, target: float | Array, newton: Newton, sizes: Sizes | None, within: float
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do.
 
-    It ``stays`` where the last update, within the tolerance, was taken: what defining systems are made of is known there.
+    It stays where the last update, below the tolerance, was taken: what defining systems are made of is known there.
     """
-    rows = () if row is None else (row,)
+    rows, stays = () if row is None else (row,), within > 0 and getattr(system, "on_curve", False)
     x, updates, before, moved = guess.copy(), list[float](), math.inf, 1.0
     factors: Factors | None = None
     with np.errstate(all="ignore"):
@@ -189,6 +188,8 @@ def _newton(
             updates += [size] if math.isfinite(size) else []
             if said == DIVERGES:
                 break
+            if number == 1 and 0 < within < math.inf and system.weights @ update**2 > within**2:
+                raise ConvergenceError(f"the prediction is off by more than {within:.2g} (updates {size:.1e})")
             if said == CONVERGED and fresh and size > newton.tolerance:  # as far as the updates before have said
                 update = _update(system, x, factors, row, target)
                 if not subtract(x.copy(), update) <= max(newton.tolerance, FAR * size):
@@ -222,8 +223,7 @@ def _settled(
     the largest state. Raises ConvergenceError where it does not become so; the message holds the last updates, relative to
     these sizes.
     """
-    rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
-    noise = np.zeros_like(x)
+    rows, relative, before, noise = () if row is None else (row,), [], np.zeros_like(x), np.zeros_like(x)
     for _ in range(newton.max_iterations):
         residual, factors = system.linearize(x, rows)
         update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
@@ -233,9 +233,8 @@ def _settled(
         least, count = newton.tolerance * np.maximum(sizes(x), before), len(updates) + len(relative)
         if np.all(np.abs(update) <= least):
             return Corrected(x, factors, count, subtract(x, update))
-        now = rounded_off(system, x, rows)
         strays = _strays(system, x, factors, row, target, update) & (np.abs(update) <= sizes(x))
-        now = np.where(strays, np.maximum(now, np.abs(update)), now)
+        now = np.maximum(rounded_off(system, x, rows), np.where(strays, np.abs(update), 0.0))
         if np.all(np.abs(update) <= np.maximum(least, UNITS * np.maximum(noise, now))):
             return Corrected(x, factors, count, float(np.max(np.abs(update) / (1 + np.abs(x)))))
         noise, before = now, sizes(update)
@@ -333,8 +332,7 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
     noise = rounded_off(system, x, rows)
     if not (np.isfinite(noise).all() and np.isfinite(update).all()):
         return False
-    level = float(np.max(noise / (1 + np.abs(x))))
-    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, coarse))
+    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * np.max(noise / (1 + np.abs(x))), coarse))
 
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:

@@ -160,17 +160,17 @@ COLLAPSED = 1e-3
 CLEAR = 1e-6
 
 
-def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
+def corrected(state: State, guess: Array, step: float, newton: Newton, reach: float = np.inf) -> Trial:
     """Return the point of the curve at ``step`` along the state's tangent, linearized right there.
 
-    Raises ConvergenceError where it is not found, or the equations are not finite there.
+    Raises ConvergenceError where it is not found within ``reach`` of the guess, or the equations are not finite there.
     """
-    row = state.row
-    small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
+    row, system = state.row, state.system
+    small = corrected_small(system, guess, row, row @ state.x + step, newton)
     if small is not None:
         linear = Linearization(small.tangent, small.sign, DenseFactors(small.matrix))
-        return Trial(state.system, small.x, linear, small.iterations, small.error)
-    return trial_of(state.system, correct(state.system, guess, row, row @ state.x + step, newton, linearize=True), row)
+        return Trial(system, small.x, linear, small.iterations, small.error)
+    return trial_of(system, correct(system, guess, row, row @ state.x + step, newton, within=reach), row)
 
 
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:

@@ -108,7 +108,7 @@ def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
     system, carry = finer
     x, row = carry(trial.x), system.weights * carry(trial.tangent)
     try:
-        return trial_of(system, correct(system, x, row, row @ x, newton, linearize=True), row)
+        return trial_of(system, correct(system, x, row, row @ x, newton, within=np.inf), row)
     except ConvergenceError:
         return None
 

@@ -91,7 +91,7 @@ def test_the_same_as_in_python(make, off, monkeypatch):
     random = np.random.default_rng(1)
     row = system.weights * random.standard_normal(system.size)
     guess = x * (1 + off * random.standard_normal(x.size))
-    found = correct(system, guess, row, row @ x, Newton(1e-10), linearize=True)
+    found = correct(system, guess, row, row @ x, Newton(1e-10), within=np.inf)
     again = correct(system, found.x * (1 + 1e-6), row, row @ x, Newton(1e-10), found.factors)
     monkeypatch.setattr(type(system), "workspace", None)
     expected = correct(system, guess, row, row @ x, Newton(1e-10))

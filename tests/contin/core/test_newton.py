@@ -178,6 +178,16 @@ def test_divergence_is_noticed_and_told():
     assert all(later <= 2 * before for before, later in zip(expected[1:-2], expected[2:-1]))
 
 
+def test_a_first_update_that_goes_too_far_ends_it():
+    """Of x^2 = 2 the first update from 9 is 79 / 18 = 4.39; the one Jacobian of it is all that it takes."""
+    equations = square_root()
+    equations.weights = np.ones(1)
+    with pytest.raises(ConvergenceError, match=r"the prediction is off by more than 4.3 \(updates 4.4e-01\)"):
+        correct(equations, [9.0], within=4.3)
+    assert len(equations.jacobians) == 1
+    assert correct(equations, [9.0], within=4.4).x == pytest.approx([ROOT], rel=1e-12)
+
+
 def test_iterations_are_limited():
     """The cube root: every step takes x to -2 x, so the relative updates stay below 3."""
     equations = Equations(np.cbrt, lambda x: np.cbrt(x) / (3 * x))
