@@ -81,8 +81,8 @@ class FoldCurve(Defining):
         """Places of both parameters, the second one last, and of those that fix the solution besides."""
         return [self.base.state_size, *range(self.base.equations + 1, self.base.size)]
 
-    def computed(self, x: Array) -> tuple[Bordered, Array]:
-        """Return the bordered matrix, with the parameters held where they are, and the residual of F."""
+    def computed(self, x: Array) -> tuple[Bordered, Array, Array]:
+        """Return the bordered matrix, with the parameters held where they are, the residual of F, and the row c."""
         base, places = self.base, self._held
         rows = np.zeros((len(places) + 1, base.size + 1))
         rows[np.arange(len(places)), places] = 1.0
@@ -95,11 +95,11 @@ class FoldCurve(Defining):
             return Bordered(factors, shape, held=len(places))
 
         found, self.borders = null_vectors(bordered, shape, self.borders, base.weights)
-        return found, residual
+        return found, residual, self.borders[1]
 
     def known(self, x: Array) -> Known:
         """Return the bordered matrix."""
-        found, residual = self.at(x)
+        found, residual, _ = self.at(x)
         return Known(residual, found.factors, found.solutions)
 
     def null_vectors(self, x: Array) -> tuple[Array, Array]:
@@ -112,9 +112,9 @@ class FoldCurve(Defining):
 
         The rows of the parameters that are held, and c, take up what w F_x leaves there.
         """
-        found: Bordered = self.at(x)[0]
+        found, _, row = self.at(x)
         *held, rest = found.transposed[0, self.base.equations :]
-        products = -np.array(held) - rest * self.borders[1][self._held]
+        products = -np.array(held) - rest * row[self._held]
         return float(products[0]), float(products[-1])
 
     def own_values(self, x: Array) -> Array:
@@ -283,10 +283,11 @@ class ExtremumCurve(Defining):
 
 
 class _Solutions(NamedTuple):
-    """x - y, V as rows (k, size), and what they come from."""
+    """x - y, V as rows (k, size), Phi, and what they come from."""
 
     x: Array
     tangents: Array
+    rows: Array
     known: Known
 
 
@@ -319,7 +320,7 @@ class EventCurve(Defining):
         right_sides = np.eye(len(rows) + 1, self.size, self.size - len(rows) - 1)
         right_sides[0] = np.append(residual, np.zeros(len(rows)))
         solutions = factors.solve(right_sides)
-        return _Solutions(x - solutions[0], solutions[1:], Known(residual, factors, solutions[1:]))
+        return _Solutions(x - solutions[0], solutions[1:], rows, Known(residual, factors, solutions[1:]))
 
     def known(self, x: Array) -> Known | None:
         """Return the matrix M, where the gradient is taken on the solutions."""
@@ -341,9 +342,9 @@ class EventCurve(Defining):
         """Return the derivatives of e by x."""
         if self._gradient is not None:
             return self._gradient(self.base, x)[None]
-        there, tangents, _ = self.at(x)
+        there, tangents, rows, _ = self.at(x)
         slopes = [derivative(lambda s: self.value(there + s * v), 1, 1 / np.abs(v).max())[0] for v in tangents]  # noqa: B023
-        gradient: Array = np.array(slopes) @ self.borders
+        gradient: Array = np.array(slopes) @ rows
         return gradient[None]
 
     def events(self) -> list[Event]:

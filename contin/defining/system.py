@@ -160,10 +160,10 @@ class Defining(Discretization):
         return self.once(self.computed, x)
 
     def once(self, compute: Callable[[Array], T], x: Array) -> T:
-        """Return what a method computes at x; it is kept for the last two, both ends of a step."""
+        """Return what a method computes at x; it is kept for the last four: both ends of a step, and two iterates between."""
         key, kept = x.tobytes(), self._known.setdefault(compute.__name__, {})
         if key not in kept:
-            if len(kept) > 1:
+            if len(kept) > 3:
                 del kept[next(iter(kept))]
             kept[key] = compute(x)
         return kept[key]
