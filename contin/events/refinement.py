@@ -21,7 +21,7 @@ from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint, Value, find_zero
 from contin.events.branch_point import locate_branch_point
 from contin.events.labelled import Elsewhere, finding_of
-from contin.levels import CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
+from contin.levels import CERTAIN, CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
@@ -87,12 +87,10 @@ class _Found(NamedTuple):
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
-    The first finer mesh of one whose error is above that tolerance is made for the tolerance. Without a mesh it is located once
-    more: the change is the error of its location. A point that is not the coarse one again (far from it, or another kernel) is
-    dropped; where Newton's method fails it has no errors. What is left after two moves follows from the last one by the order
-    that both have, unless it is below the tolerance of Newton's method. Where a halved mesh brings it hardly closer, it moves
-    by round-off: its error is the larger of the last two moves. No error is below what Newton's method leaves. On more than
-    ``max_intervals`` intervals, or where it moves further than before, only the estimate is made: it stays on the mesh before.
+    The first finer mesh is made for the tolerance if the error is above it. Without a mesh the point is located once more: the
+    change is its error. A point far from the coarse one, or with another kernel, is lost. What is left after two moves, of a
+    branch point after one, follows from the last one by its order. A point that moves hardly less than before, or hardly more
+    than Newton's method leaves, moves by round-off. If it moves further, or on too many intervals, it stays on the mesh before.
     """
     trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
@@ -120,6 +118,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             steps = moves * _part_left(trial, better)
             if holds and not system.on_curve:
                 steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
+        elif not seen and system.intervals and finding_of(found).has_equations:  # its round-off is added below
+            steps = moves * _part_by_order(1.0, 1.0, 0.0, system.degree)
         moved = float(np.max((steps := np.maximum(steps, least)) / size))
         if np.any(steps > _FAR * size):
             is_lost = last == np.inf
@@ -130,7 +130,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             steps, left = np.maximum(part * steps, np.minimum(steps, settings.newton.tolerance * size)), _SAFE * left
         noise = 0.0 if holds else max(trial.newton_error, better.newton_error)
         if noise > settings.newton.tolerance:  # round-off moves the point so far, about the way that it has moved
-            steps = steps * max(noise / float(np.max(steps / size)), 1.0)
+            steps, noise = steps * max(noise / float(np.max(steps / size)), 1.0), CERTAIN * noise
         settled = np.maximum(np.maximum(max(settings.mesh.tolerance, noise) * size, left), least) >= steps
         change = np.maximum(steps, before) if moved > _CLOSER * last else steps
         known = change + left + finding_of(found).split(system)  # a curve of branch points has one unknown more
@@ -255,9 +255,8 @@ def zero_again(
     slope of the function there, as far as it is known; ``slope`` is about that. Raises ConvergenceError where Newton's method
     fails, or there is no zero.
     """
-    distance, holds = 0.0, test is not None and test.holds_one_of(system.free)
-    if holds:
-        tangent, distance = _towards(system, x, tangent, test)
+    holds = test is not None and test.holds_one_of(system.free)
+    tangent, distance = _towards(system, x, tangent, test) if holds else (tangent, 0.0)
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
     factors: Factors | None = None
 
