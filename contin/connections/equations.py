@@ -395,7 +395,7 @@ class ConnectionCollocation(Collocation):
         unit = np.append(np.zeros(self._n), 1.0)
         q, p = (np.linalg.solve(matrix, unit)[:-1] for matrix in (bordered, bordered.T))
         q /= np.linalg.norm(q)
-        bent = self._bent_jacobian(values, q, 0) @ q
+        bent = self._bent_jacobians(values, q[None], 0)[0] @ q
         return p / (p @ q), float(p @ bent / (p @ q)) / 2
 
     def cut_off_errors(self, x: Array, factors: Factors) -> Array:
@@ -405,32 +405,31 @@ class ConnectionCollocation(Collocation):
 
             H (K x I + I x K) - M H = L B(N, N) / 2,        A N = N K,  L A = M L,
 
-        B the second derivatives. Each condition is changed by that, and by an estimate of the next term, which is not known:
-        the third power of the distance, over the square of the orbit's size.
+        B the second derivatives, z = C^T (u - e) for C normal to the space of the reference. Each condition is changed by that,
+        and by an estimate of the next term, which is not known: the third power of the distance, over the square of the orbit's
+        size.
         """
         p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
         amounts: list[float] = []
-        for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
+        for end, ((Q, L, _), C, apart) in enumerate(zip(self._subspaces(p), self._complements, self.apart(x))):
             if not len(L):
                 continue
-            A, L = self._linear_at_ends(p)[end].jacobian, _normalized(L, self._bases[end])
-            N = np.linalg.svd(L)[2][len(L) :].T
-            K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
-            bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
-            H = _sylvester(-M, np.kron(K, unit) + np.kron(unit, K))(bent)
-            z = N.T @ apart
-            amounts += [*(np.abs(H @ np.kron(z, z)) + float(np.linalg.norm(apart)) ** 3 / size**2)]
+            A, N, z = self._linear_at_ends(p)[end].jacobian, C - Q.T @ (L @ C), C.T @ apart
+            sums, bent = (C.T @ A @ N)[:, None, :, None] * np.eye(len(z))[:, None], L @ self._bent_jacobians(p, N.T, end) @ N
+            sums = (sums + sums.transpose(1, 0, 3, 2)).reshape(z.size**2, -1)  # as of np.kron, in a third of the time
+            H = _sylvester(-L @ A @ Q.T, sums)(np.hstack([*bent]) / 2)
+            amounts += [*(np.abs(H @ np.outer(z, z).ravel()) + float(np.linalg.norm(apart)) ** 3 / size**2)]
         right_sides = np.zeros((len(amounts), self.equations + 1))
         right_sides[range(len(amounts)), range(self._conditions, self._conditions + len(amounts))] = amounts
         return factors.solve(right_sides)
 
-    def _bent_jacobian(self, p: Array, direction: Array, end: int) -> Array:
-        """Return the derivative of the Jacobian at an equilibrium along a direction of the states, both scaled."""
-        moved = np.zeros(len(self.parameters))
-        names = self.problem.multipliers
+    def _bent_jacobians(self, p: Array, directions: Array, end: int) -> Array:
+        """Return the derivatives of the Jacobian at an equilibrium along directions (k, n) of the states, all scaled."""
+        moved, names = np.zeros((len(directions), len(self.parameters))), self.problem.multipliers
         own = names[: self._n] if end == 0 or self.problem.homoclinic else names[self._n :]
-        moved[self._indices(own)] = direction * self.scales.states
-        return self._jacobians_along(p, [moved], end)[0,]
+        moved[:, self._indices(own)] = directions * self.scales.states
+        places = np.repeat(self._places(p[None])[end], len(directions), axis=0)
+        return self._jacobians_at(places, p, [np.hstack([self._places(moved)[end], moved])])
 
     def apart(self, x: Array) -> tuple[Array, Array]:
         """Return u(0) - e and u(1) - e', scaled."""
