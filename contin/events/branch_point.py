@@ -92,9 +92,10 @@ class BorderedMatrix:
 
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
-        w, (a, b) = self.multipliers(), self.kernel
-        aa, ab, bb = (float(-w @ self._system.along(x, pair)) for pair in ((a, a), (a, b), (b, b)))
-        return np.array([[aa, ab], [ab, bb]])
+        w, kernel, system = self.multipliers(), self.kernel, self._system
+        if hasattr(system, "bent"):
+            return -np.array([system.bent(x, w, v) for v in kernel]) @ kernel.T
+        return np.array([[float(-w @ system.along(x, (a, b))) for b in kernel] for a in kernel])
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:

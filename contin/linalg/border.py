@@ -156,10 +156,9 @@ def orthonormal(vectors: Array, weights: Array | float = 1.0) -> Array:
 
     Determinants of equations that are stated on the basis keep their sign when borders are renewed.
     """
-    root = np.sqrt(weights)
-    columns, triangle = np.linalg.qr((vectors * root).T)
-    basis: Array = (columns * np.copysign(1.0, np.diag(triangle))).T / root
-    return np.ascontiguousarray(basis)
+    basis: Array = np.multiply(vectors, root := np.sqrt(weights), order="C")
+    orthonormalize(basis, 0)
+    return basis / root
 
 
 def _largest_part(vector: Numbers) -> Array:
