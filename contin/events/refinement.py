@@ -19,7 +19,7 @@ from contin.core.step import ROUNDS, corrected, located, standing_at
 from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.arc import SpecialPoint, Value, find_zero
-from contin.events.branch_point import locate_branch_point
+from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, finding_of
 from contin.levels import CERTAIN, CORRECTED, LAST_PLACES, LOCATED, MOST_UPDATES, ROUGH
 from contin.linalg.blocks import Factors
@@ -87,10 +87,10 @@ class _Found(NamedTuple):
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
-    The first finer mesh is made for the tolerance if the error is above it. Without a mesh the point is located once more: the
-    change is its error. A point far from the coarse one, or with another kernel, is lost. What is left after two moves, of a
-    branch point after one, follows from the last one by its order. A point that moves hardly less than before, or hardly more
-    than Newton's method leaves, moves by round-off. If it moves further, or on too many intervals, it stays on the mesh before.
+    The first finer mesh is made for the tolerance if the error is above it. Without a mesh the point is located once more, a
+    branch point by `BranchPoint.round_off`. A point far from the coarse one, or with another kernel, is lost. What is left
+    after two moves, of a branch point after one, follows from the last one by its order. A point that moves hardly less than
+    before, or hardly more than Newton's method leaves, moves by round-off. If it moves further, it stays on the mesh before.
     """
     trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
@@ -101,12 +101,12 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         now = _on_switches(point, _Found(trial, details, slope=point.slope), settings.newton)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
-    (trial, details, *_), is_lost = now, False
+    (trial, details, *_), is_lost, stays = now, False, isinstance(now.details, BranchPoint) and not trial.system.intervals
     for number in range(_HALVINGS):
         coarse = trial.system
         made = None if number else _on_made_mesh(point, now, settings)
         try:
-            again = made or _again(point, now, coarse.refined() or (coarse, np.array), settings.newton)
+            again = made or (now if stays else _again(point, now, coarse.refined() or (coarse, np.array), settings.newton))
             better, found, left, _ = now = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
