@@ -94,14 +94,16 @@ class ConnectionCollocation(Collocation):
         self.reference = x.copy()
         self._phase = self.phase_row(self._scaled_states(x))
         self._target = float(self._phase @ x)
-        left_vectors = self._left_vectors(self.all_parameters(x))  # the closest orthonormal bases of the same spaces
-        both = [(len(left), *_singular(left)) for left in left_vectors]
-        self._bases = tuple(u @ v[:count] for count, u, v in both)
-        self._complements = [v[count:].T for count, _, v in both]  # orthonormal, too
+        p = self.all_parameters(x)
+        if self._bases_at != (at := p.tobytes()):  # other meshes have the same
+            both = [(len(left), *_singular(left)) for left in self._left_vectors(p)]  # the closest bases, orthonormal
+            self._bases, self._bases_at = tuple(u @ v[:count] for count, u, v in both), at
+            self._complements = [v[count:].T for count, _, v in both]  # orthonormal, too
 
     _phase: Array
     _target: float
     _bases: Any
+    _bases_at = b""
     _complements: list[Array]
 
     @functools.cached_property
@@ -406,8 +408,7 @@ class ConnectionCollocation(Collocation):
             H (K x I + I x K) - M H = L B(N, N) / 2,        A N = N K,  L A = M L,
 
         B the second derivatives, z = C^T (u - e) for C normal to the space of the reference. Each condition is changed by that,
-        and by an estimate of the next term, which is not known: the third power of the distance, over the square of the orbit's
-        size.
+        and by an estimate of the next term: the third power of the distance over the square of the orbit's size.
         """
         p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
         amounts: list[float] = []
