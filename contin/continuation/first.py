@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.meshes import ATTEMPTS, accuracy_of, finer, is_poor
+from contin.continuation.meshes import ATTEMPTS, finer, is_poor
 from contin.continuation.scaling import renewed, scaled
 from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization, inner
@@ -80,8 +80,8 @@ def _accurate(
 ) -> tuple[Discretization, Array, Linearization]:
     """Return the point on a mesh on which its error is within the tolerance, as far as one is found."""
     for _ in range(ATTEMPTS):
-        accuracy = accuracy_of(Trial(system, x, linear))
-        other = finer(system, x, accuracy.error, settings.mesh) if is_poor(accuracy, settings.mesh) else None
+        trial = Trial(system, x, linear)
+        other = finer(system, x, trial.discretization_error, settings.mesh) if is_poor(trial, settings.mesh) else None
         if other is None:
             break
         system, carry = other

@@ -39,8 +39,8 @@ from contin.results.point import Point
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
-#: The length of a step, its beginning, and its end with the judgement.
-Handed = tuple[float, Trial, Made]
+#: The length of a step, its beginning, its end with the judgement, and whether it is plain but for the error of its mesh.
+Handed = tuple[float, Trial, Made, bool]
 #: Where steps on a mesh begin: factors, and their place in the lane.
 _Begun = tuple[Factorization, int]
 #: How many steps were made, and the index at their ends, if any.
@@ -231,16 +231,15 @@ class MeshLane(Lane):
             if not asks:
                 error = estimate(self._work, after.room, self._estimate, path.x[number])
                 path.numbers[number, rules.MESH_ERROR] = error
-                asks = not error <= poor
             if not asks and (self._wants or path.numbers[number, rules.CLOSES]):
                 begin = here if self._wants else self._trial(path, number - 1, before)
                 here = self._trial(path, number, after)
                 asks = self._asks(begin, here, path.numbers[number])
-            if asks:
+            if asks or not error <= poor:
                 if step <= 0:
                     self.spectra.moved[0] = np.inf
                 if step:
-                    self._hand_over(path, number, abs(step), (before, after))
+                    self._hand_over(path, number, abs(step), (before, after), not asks)
                 return number - 2, indices or None
             if self._wants:
                 indices.append(self._index_at(here))
@@ -293,7 +292,7 @@ class MeshLane(Lane):
         """Return whether no singular value comes near zero in a step, by all of them where condensed matrices do not decide."""
         return changes_little(before, after, self.system.size) if clear == on_mesh.TURNS else clear == on_mesh.CALM
 
-    def _hand_over(self, path: rules.Path, number: int, step: float, both: tuple[Factorization, Factorization]) -> None:
+    def _hand_over(self, path: rules.Path, number: int, step: float, both: Sequence[Factorization], plain: bool) -> None:
         """Keep a step that was made and asks for a closer look, with the factors at both ends, which the lane gives away."""
         sign, iterations, error = self._attempt.judged[[rules.SIGN, rules.UPDATES, rules.ERROR]].tolist()
         both[0].sign, both[1].sign = float(path.numbers[number - 1, rules.SIGN_OF]), sign
@@ -304,7 +303,7 @@ class MeshLane(Lane):
         begin = Trial(self.system, path.x[number - 1].copy(), first)
         end = Trial(self.system, path.x[number].copy(), last, int(iterations), error)
         end._discretization_error = float(path.numbers[number, rules.MESH_ERROR]) or None  # 0 where it is not known yet
-        self._handed = step, begin, (end, rules.judgement_of(self._attempt, path, number, BELIEVED))
+        self._handed = step, begin, (end, rules.judgement_of(self._attempt, path, number, BELIEVED)), plain
         self._factors = [None if each in both else each for each in self._factors]
 
     def _spare(self, place: int) -> Factorization:

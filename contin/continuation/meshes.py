@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,7 +15,7 @@ from contin.collocation.mesh import MeshControl
 from contin.continuation.points import unsettled
 from contin.continuation.rules import Judgement
 from contin.continuation.scaling import outgrown
-from contin.continuation.steps import Made, Steps
+from contin.continuation.steps import Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.step import State, trial_of
@@ -26,25 +25,6 @@ from contin.errors import ConvergenceError
 from contin.events.arc import Arc
 from contin.events.inspection import jumped
 from contin.levels import CERTAIN, LOCATED
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """The estimated discretization error of a point, relative to 1 + size; NaN where it is not known, 0 without a mesh."""
-
-    error: float
-    trial: Trial | None = None
-
-    @functools.cached_property
-    def is_round_off(self) -> bool:
-        """A finer mesh would not make it smaller."""
-        trial = self.trial
-        return trial is not None and self.error <= CERTAIN * trial.system.newton_error(trial.x, trial.factors)
-
-
-def accuracy_of(trial: Trial) -> Accuracy:
-    """Return the estimated discretization error of a point of a curve."""
-    return Accuracy(trial.discretization_error, trial)
 
 
 class _Bordered:
@@ -64,16 +44,16 @@ class _Bordered:
         return self._factors.solve(np.append(b, 0.0))[: self._size]
 
 
-def at_branch_point(trial: Trial) -> Accuracy:
+def error_at_branch_point(trial: Trial) -> float:
     """Return the estimated error of a branch point from which a run starts, without the part in the kernel of F_x.
 
     A cycle of no size, as that at a Hopf point, is the same on every mesh.
     """
     system = trial.system
     if not system.intervals or (system.size_of_solutions is not None and not np.ptp(system.states(trial.x), axis=0).any()):
-        return Accuracy(0.0)
+        return 0.0
     factors: Any = _Bordered(trial)
-    return Accuracy(system.discretization_error(trial.x, factors, trial))
+    return system.discretization_error(trial.x, factors, trial)
 
 
 #: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
@@ -97,11 +77,15 @@ _FAR_TOO_MANY = 4
 Moved = tuple[State, Trial | None]
 
 
-def is_poor(accuracy: Accuracy, control: MeshControl) -> bool:
+def is_poor(trial: Trial, control: MeshControl) -> bool:
     """Return whether a point has a larger error than the tolerance of the mesh, which a finer one would lower."""
-    if not (control.every and accuracy.error > control.tolerance and accuracy.trial is not None):
-        return False
-    return accuracy.trial.system.intervals < control.max_intervals and not accuracy.is_round_off
+    is_above = bool(control.every) and trial.discretization_error > control.tolerance
+    return is_above and trial.system.intervals < control.max_intervals and not _is_round_off(trial)
+
+
+def _is_round_off(trial: Trial) -> bool:
+    """Return whether a finer mesh would not make the error of a point smaller."""
+    return trial.discretization_error <= CERTAIN * trial.system.newton_error(trial.x, trial.factors)
 
 
 def finer(system: Discretization, x: Array, error: float, control: MeshControl) -> tuple[Discretization, Carrier] | None:
@@ -146,10 +130,12 @@ class MeshPolicy:
 
     - ``steps`` (Steps): How the steps of the run are made, with its settings.
     - ``tests`` (sequence of Event): Those that have the same sign on every mesh.
+    - ``own`` (sequence of Event): Those of the kind of problem.
     """
 
     steps: Steps
     tests: Sequence[Event]
+    own: Sequence[Event]
 
     def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
         """Return the state on a mesh that is adapted to it, if one serves; ``here`` returns the state's point."""
@@ -193,35 +179,30 @@ class MeshPolicy:
             system.check_jumps(end.x, state, False)
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
-        before = here()
-        if system.collapsed(x, done.x) or self.steps.reverses(before, end):
+        before, name, coarser = here(), self.steps.settings.trivial, system.intervals < state.system.intervals
+        if system.collapsed(x, done.x) or self.steps.reverses(before, end) or (coarser and not self._serves(state, end)):
             return None
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
             return None  # the next point will do as well
-        if self.steps.settings.trivial is not None and jumped(before, end, self.steps.settings.trivial, newton):
-            return None
-        if system.intervals < state.system.intervals and not self._serves(state, end):
+        if name is not None and jumped(before, end, name, newton):
             return None
         return dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         ), end
 
-    def good_step(self, run: Place, step: float, made: Made | None) -> tuple[Arc, Judgement]:
-        """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
+    def good_step(self, run: Place, arc: Arc, judgement: Judgement) -> tuple[Arc, Judgement]:
+        """Make a step again until its end has an error within the tolerance of the mesh, as far as finer ones help.
 
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
-        it is looked at closely: that takes longer than to make it. ``made`` is its end, where a kernel has it. Raises
-        ConvergenceError.
+        it is looked at closely: that takes longer than to make it. Raises ConvergenceError.
         """
-        control = self.steps.settings.mesh
-        arc, judgement = self.steps.attempt(run.state, run.here(), step, made)
-        accuracy = accuracy_of(arc.trial.settled)
+        control, step = self.steps.settings.mesh, arc.step
         for _ in range(ATTEMPTS):
             end, known = arc.trial.settled, (run.state, run.here())
-            if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
+            if not is_poor(end, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break
             there = run.state if end.system.outcomes.size else end  # the state has other crossings than the end
-            other = finer(there.system, there.x, accuracy.error, control)
+            other = finer(there.system, there.x, end.discretization_error, control)
             if other is not None and not end.system.outcomes.size:
                 mesh = other[0]  # it has points where the end meets corners; the state has others
                 mesh = (mesh.on_switches(run.state.system.carrier(mesh)(run.state.x)) or other)[0]
@@ -230,12 +211,32 @@ class MeshPolicy:
                 break
             near = end.system.carrier(run.state.system)(end.x)
             again, judged_again = self.steps.attempt(run.state, run.here(), step, near=near)
-            better = accuracy_of(again.trial.settled)
-            if not better.error < _HELPS * accuracy.error:
+            if not again.trial.settled.discretization_error < _HELPS * end.discretization_error:
                 run.go_on(known)
                 break
-            arc, judgement, accuracy = again, judged_again, better
+            arc, judgement = again, judged_again
         return arc, judgement
+
+    def ends_finer(self, arc: Arc, judgement: Judgement) -> bool:
+        """Move the end of a plain step to a finer mesh, half the work of making it again; return whether that will do."""
+        state, control = self.steps.accepted(arc, judgement, False), self.steps.settings.mesh
+        end = best = arc.trial
+        hangs = any(not (test.asks or test.still) for test in self.own)  # those of connections differ from mesh to mesh
+        if hangs or end.system.outcomes.size or unsettled(end, control.tolerance, self.steps.primary):
+            return False
+        while is_poor(best, control):
+            other = finer(state.system, state.x, best.discretization_error, control)
+            moved = None if other is None else self.moved(state, lambda: end, other)
+            if moved is None or (found := moved[1]) is None or found.sign != end.sign:
+                return False
+            if not found.discretization_error < _HELPS * best.discretization_error:
+                break
+            passes = any(test.passed(end.value(test), found.value(test)) for test in self.own)
+            if passes or self.steps.sense(end) != self.steps.sense(found):
+                return False  # a special point lies between both meshes
+            state, best = moved[0], found
+        end.settled = best
+        return True
 
     def _fewest_intervals(self, state: State, here: Callable[[], Trial]) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
@@ -249,7 +250,7 @@ class MeshPolicy:
             return control.min_intervals
         far_below = error < _FAR_BELOW * control.tolerance
         if not far_below and now > _FAR_TOO_MANY * control.min_intervals and self.steps.settings.newton.tolerance > LOCATED:
-            far_below = state.system.size_of_solutions is not None and accuracy_of(here()).is_round_off
+            far_below = state.system.size_of_solutions is not None and _is_round_off(here())
         count = now // 2 if far_below else min(_intervals_for(state.system, error, control), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
@@ -258,8 +259,8 @@ class MeshPolicy:
 
         Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
         """
-        accuracy, before, control = accuracy_of(end), state.discretization_error, self.steps.settings.mesh
-        return not is_poor(accuracy, control) and not (before > control.tolerance and accuracy.error > before)
+        before, control = state.discretization_error, self.steps.settings.mesh
+        return not is_poor(end, control) and not (before > control.tolerance and end.discretization_error > before)
 
     def _is_too_fine(self, state: State, here: Callable[[], Trial]) -> bool:
         """Return whether the error is round-off above the tolerance, on far more intervals than the density asks for.
@@ -268,9 +269,7 @@ class MeshPolicy:
         stands still, in an explosion, errors of the mesh are taken for round-off.
         """
         control, now = self.steps.settings.mesh, state.system.intervals
-        if not state.discretization_error > control.tolerance or control.min_intervals * _FAR_TOO_MANY > now:
-            return False
-        wanted = state.system.adapted(state.x, control)
-        if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > now:
-            return False
-        return accuracy_of(here()).is_round_off and bool(self.steps.sense(here()))
+        far = state.discretization_error > control.tolerance and control.min_intervals * _FAR_TOO_MANY <= now
+        wanted = state.system.adapted(state.x, control) if far else None
+        far = wanted is not None and wanted[0].intervals * _FAR_TOO_MANY <= now
+        return far and _is_round_off(here()) and bool(self.steps.sense(here()))

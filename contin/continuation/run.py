@@ -23,7 +23,7 @@ from contin.boundary.grazing import Touch
 from contin.continuation.failure import ended, limit_neared, met, no_convergence, runs_away, shorter_steps
 from contin.continuation.first import begins_outside, corrected_first, frozen, on_branch
 from contin.continuation.lane import FEWEST, MOST, Handed, Lanes
-from contin.continuation.meshes import Accuracy, MeshPolicy, Moved, accuracy_of, at_branch_point
+from contin.continuation.meshes import MeshPolicy, Moved, error_at_branch_point, is_poor
 from contin.continuation.points import IndexChange, Notes, begun_at, index_changes, is_confirmed, located_again, told, unsettled
 from contin.continuation.rules import JUMPS, NOISY, judged, length_of_step, predict
 from contin.continuation.steps import Step, Steps
@@ -102,14 +102,14 @@ class Continuation:
         self._limits = limits(settings.limits)
         general = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema), *settings.events]
         self._tests = [*general, *self._conditions, *self._own]
-        self._meshes = MeshPolicy(self._steps, general)
+        self._meshes = MeshPolicy(self._steps, general, [*self._conditions, *self._own])
         self._notes = Notes(self.primary, self._path.mesh.tolerance, bool(settings.mesh.every))
         if conserved := getattr(system.solution.problem, "conserved", ""):
             self._notes.add(conserved)
         if state is not None and state.previous_tangent is not None:
             self.here().refactor(state.system.weights * state.previous_tangent)  # as the step before left them
         self._resumed = state is not None
-        self._accuracy = Accuracy(np.nan)  # of the end of the last step
+        self._error = np.nan  # of the mesh, at the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
         self._watch = Watch(self.start, self._path, self._tests, general, self._steps.fold)
         if state is None:
@@ -174,7 +174,7 @@ class Continuation:
             located = located_again(begun_at(self._origin, first), self.settings)
             self._notes.corners(trial)
             self._notes.contacts(trial)
-            yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
+            yield self._point(located, self.state, error=error_at_branch_point(trial) if self.state.singular else None)
             self.stop = begins_outside(trial, self.settings, self._own, self.state.singular)
         while self.stop is None:
             self._follow()
@@ -194,7 +194,7 @@ class Continuation:
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self.here())
             for self._state, point in block.points():
-                self._end, self._accuracy = None, Accuracy(point.discretization_error)
+                self._end, self._error = None, point.discretization_error
                 yield point
             if block.made < most or most <= 0:
                 self._handed = block.handed
@@ -242,9 +242,9 @@ class Continuation:
             return
         if isinstance(step, SpecialPoint):
             self.stop = step.stop
-            yield self._point(located_again(step, self.settings), self.state, accuracy=self._accuracy)
+            yield self._point(located_again(step, self.settings), self.state, error=self._error)
             return
-        self._accuracy = accuracy_of(step.end)
+        self._error = step.end.discretization_error
         arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
         special = within_limits(arc, special, self._limits)
         found = list[SpecialPoint]()
@@ -269,7 +269,7 @@ class Continuation:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
                 if self.stop.details and isinstance(point.details, (dict, type(None))):  # no details of another kind
                     point = dataclasses.replace(point, details={**(point.details or {}), **self.stop.details})
-            if point.label != Label.BRANCH_POINT or not self._notes.phases(point, self._accuracy.error):
+            if point.label != Label.BRANCH_POINT or not self._notes.phases(point, self._error):
                 yield self._point(point, arc.state, change)
             if self.go_on(None if behind is None else (behind, None)) or self.stop is not None:
                 return
@@ -288,7 +288,7 @@ class Continuation:
         self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes, self.start[:2])
         label, name = (Label.END, str(self.stop.reason)) if self.stop else (Label.REGULAR, "")
         found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
-        yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
+        yield self._point(found_at_end, arc.state, error=self._error)
 
     def _without_step(self, error: ConvergenceError) -> Iterator[Point]:
         """Yield the point at which no step was possible and end there, unless shorter steps are left to try."""
@@ -301,7 +301,7 @@ class Continuation:
         self.stop = stop
         label = Label.FAILED if not stop.event else Label.GRAZING if grazes else Label.END
         failure = SpecialPoint(0.0, label, stop.event or "no convergence", here, is_located=not grazes)  # within a step
-        yield self._point(failure, self.state, accuracy=self._accuracy)
+        yield self._point(failure, self.state, error=self._error)
 
     def _turn(self, point: SpecialPoint, arc: Arc) -> Iterator[Point]:
         """Go on behind a corner, and yield it: a run that is resumed there does not come to it again."""
@@ -326,7 +326,7 @@ class Continuation:
                 self.stop = ended(at.trial, self.state, settings, self.primary, self._notes, self.start[:2])
             self._left.append((length, left))
         if corner is not None:
-            yield self._point(corner, state, self._index_across(corner, ways), self._accuracy)
+            yield self._point(corner, state, self._index_across(corner, ways), self._error)
 
     def _grazed(self, point: SpecialPoint, arc: Arc, turned: bool) -> tuple[SpecialPoint, State | None]:
         """Return a grazing point, as a fold where the parameter turns, and the state behind it if the step's end is none.
@@ -371,15 +371,19 @@ class Continuation:
 
     def _step(self, state: State) -> Step | SpecialPoint:
         """Predict and correct, halving the step until the corrected point can be believed; or return the end of the branch."""
-        settings, (step, _, made), self._handed = self._steps.settings, self._handed or (0.0, None, None), None
+        settings, (step, _, made, plain), self._handed = self._steps.settings, self._handed or (0.0, None, None, False), None
         if made is None or made[0].system is not state.system:  # the mesh may have changed meanwhile
             step, made = length_of_step(self._steps.room(state)), None
         finest = max(settings.min_step, ROUGH * step)
         while True:
             try:
-                arc, judgement = self._meshes.good_step(self, step, made)
-                inspection = self._watch.inspection(arc)
-                if not self._watch.asks(inspection):
+                arc, judgement = self._steps.attempt(self.state, self.here(), step, made)
+                inspection, poor = self._watch.inspection(arc), is_poor(arc.trial.settled, settings.mesh)
+                asks = not (plain and made) and self._watch.asks(inspection)
+                if poor and (asks or not self._meshes.ends_finer(arc, judgement)):
+                    arc, judgement = self._meshes.good_step(self, arc, judgement)
+                    asks = self._watch.asks(inspection := self._watch.inspection(arc))
+                if not asks:
                     return Step(arc, judgement)
                 doubt = self._watch.doubt(inspection)
                 if step < 2 * finest or not doubt:
@@ -437,15 +441,13 @@ class Continuation:
 
     # --- results -------------------------------------------------------------------------------------------------
 
-    def _point(
-        self, found: SpecialPoint, state: State, change: IndexChange | None = None, accuracy: Accuracy | None = None
-    ) -> Point:
-        """Return the point of a branch; its accuracy is estimated where it is not known."""
+    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None, error: float | None = None) -> Point:
+        """Return the point of a branch; its error that is due to the mesh is estimated where it is not known."""
         trial = found.trial
-        if accuracy is None and not found.closes and np.isfinite(trial.tangent).all():
-            accuracy = accuracy_of(trial)
-        elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
-            accuracy = self._accuracy
+        if error is None and not found.closes and np.isfinite(trial.tangent).all():
+            error = trial.discretization_error
+        elif error is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
+            error = self._error
         if found.label != Label.BRANCH_POINT and found.label:  # branch points are asked before
-            self._notes.phases(found, accuracy.error)
-        return told(found, state.arclength + found.at, self._watch.index, change, accuracy.error)
+            self._notes.phases(found, error)
+        return told(found, state.arclength + found.at, self._watch.index, change, error)
