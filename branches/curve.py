@@ -48,7 +48,7 @@ def follow(branch: StoredBranch, point: int, second: str, between) -> Branch:
     if not low <= here <= high or low == high:
         raise ConfigError(f"--between: must hold the value of the result, {second} = {here * branch.scene.factor(second):g}")
     start = dataclasses.replace(point_of(system, x), label=Label.FOLD, column=system.free[0])
-    return curve(start, second, direction="both", limits={second: (low, high)})
+    return curve(start, second, direction="both", limits={second: (low, high)}, progress=False)
 
 
 def main(argv=None) -> int:
