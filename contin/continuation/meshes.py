@@ -235,6 +235,8 @@ class MeshPolicy:
             if passes or self.steps.sense(end) != self.steps.sense(found):
                 return False  # a special point lies between both meshes
             state, best = moved[0], found
+        if best is not end and state.previous_tangent is not None:
+            best.refactor(state.system.weights * state.previous_tangent)  # as a run that goes on from its file has them
         end.settled = best
         return True
 
