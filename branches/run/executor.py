@@ -147,7 +147,7 @@ class _Processes:
     """Local processes, managed by the thread that uses them, without shared locks: a killed process leaves no lock behind."""
 
     def __init__(self, count: int, time_limit: float | None):
-        self._context = multiprocessing.get_context(_start_method())
+        self._context = multiprocessing.get_context(_START_METHOD)
         self._count, self._time_limit = count, time_limit
         self._workers: list[_Worker] = []
         self._queue: collections.deque[tuple[futures.Future, tuple]] = collections.deque()
@@ -214,6 +214,8 @@ def _sendable(error: Exception) -> Exception:
     return error
 
 
+#: How processes start: forks have the compiled kernels; outside Linux they are not safe or not available.
+_START_METHOD = "fork" if sys.platform.startswith("linux") else "spawn"
 #: Environment variables with the number of cores that a cluster's scheduler (Slurm, PBS, Grid Engine, LSF) grants.
 _GRANTED = ("SLURM_CPUS_PER_TASK", "PBS_NUM_PPN", "NSLOTS", "LSB_DJOB_NUMPROC")
 
@@ -223,11 +225,6 @@ def cores() -> int:
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     granted = [os.environ.get(name, "") for name in _GRANTED]
     return min([bound, *(int(text) for text in granted if text.isdecimal() and int(text) > 0)])
-
-
-def _start_method() -> str:
-    """Return how processes start: forks have the compiled kernels; outside Linux they are not safe or not available."""
-    return "fork" if sys.platform.startswith("linux") else "spawn"
 
 
 def _alone(function: Callable[[Any], Any], job: object) -> Any:

@@ -128,7 +128,7 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int) -> int:
     ``accepted`` is the number of regular points up to row 1.
     """
     equations, linear, frame, attempt, control, watch, quotient, spectra = rooms
-    small.evaluate_slopes(equations, path.x[1])
+    small.evaluate(equations, path.x[1], equations.slopes, equations.slopes_found)
     small.fill_matrix(equations, path.tangents[1], linear.matrix)
     if watch.eigenvalues and fill_spectrum(equations, spectra, LAST):
         return 0

@@ -137,19 +137,11 @@ def put(equations: Equations, x: Array) -> None:
 
 
 @helper
-def evaluate_values(equations: Equations, x: Array) -> None:
-    """Evaluate the functions."""
+def evaluate(equations: Equations, x: Array, functions: Loaded, slopes: Stack) -> None:
+    """Evaluate the functions, and their derivatives by the unknowns where ``functions`` have them."""
     put(equations, x)
     points = Points(equations.time, equations.states, equations.none)
-    run_loaded(equations.values, equations.parameters, points, equations.found, equations.no_slopes)
-
-
-@helper
-def evaluate_slopes(equations: Equations, x: Array) -> None:
-    """Evaluate the functions and their derivatives by the unknowns."""
-    put(equations, x)
-    points = Points(equations.time, equations.states, equations.none)
-    run_loaded(equations.slopes, equations.parameters, points, equations.found, equations.slopes_found)
+    run_loaded(functions, equations.parameters, points, equations.found, slopes)
 
 
 @helper
@@ -183,7 +175,7 @@ def fill_matrix(equations: Equations, row: Array, matrix: Array) -> None:
 @helper
 def linearize(equations: Equations, linear: Linear, x: Array) -> float:
     """Factor [F_x; row] at x; return the sign of its determinant."""
-    evaluate_slopes(equations, x)
+    evaluate(equations, x, equations.slopes, equations.slopes_found)
     fill_matrix(equations, linear.row, linear.matrix)
     return factor_small(linear.matrix, linear.lu, linear.exchanges)
 
@@ -206,7 +198,7 @@ def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, 
     for number in range(1, most + 1):
         now = math.inf
         if not fresh:
-            evaluate_values(equations, x)
+            evaluate(equations, x, equations.values, equations.no_slopes)
         elif linearize(equations, linear, x) == 0.0:
             break
         _fill_update(equations, linear, x, target)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.core.small import Equations, evaluate_slopes
+from contin.core.small import Equations, evaluate
 from contin.events.dips import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near, parabola
 from contin.kernels.kernel import kernel
 from contin.kernels.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
@@ -273,7 +273,7 @@ def _crosses(spectra: Spectra) -> bool:
 def _look(equations: Equations, spectra: Spectra, number: int) -> bool:
     """Fill in the eigenvalues at a place of the cubic; return whether round-off decides on the side of one of them."""
     fill_place(spectra, number)
-    evaluate_slopes(equations, spectra.place)
+    evaluate(equations, spectra.place, equations.slopes, equations.slopes_found)
     return fill_spectrum(equations, spectra, number)
 
 

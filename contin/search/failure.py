@@ -28,7 +28,7 @@ from contin.continuation.run import Continuation
 from contin.core.labels import Label
 from contin.core.newton import UNITS, Corrected, Newton, approached, correct
 from contin.core.settings import Settings
-from contin.core.system import System
+from contin.core.system import System, usual
 from contin.cycles.statement import CycleProblem
 from contin.equilibria.dependence import reduced
 from contin.equilibria.equations import Algebraic
@@ -328,9 +328,10 @@ def dependence(system: System, x: Array) -> str:
     """Return which conditions of a boundary value problem follow from others or contradict them, as a sentence; or ""."""
     if isinstance(system.problem, (CycleProblem, ConnectionProblem)):
         return _of_orbit(system, x, _rank(system, x))
-    plain = type(system.problem) in (BoundaryValueProblem, SegmentedProblem)  # no special kind
-    rank = _rank(system, x) if plain else None
-    if rank is None:
+    if type(system.problem) not in (BoundaryValueProblem, SegmentedProblem):  # a special kind
+        return ""
+    system, x = _evenly_scaled(system, x)
+    if (rank := _rank(system, x)) is None:
         return ""
     if not rank.null.size:
         return _phase(system, x)
@@ -340,6 +341,16 @@ def dependence(system: System, x: Array) -> str:
     if not rank.null.size or (solved and not _are_many(system, z, rank)):
         return ""
     return _jumping(system, rank) or _conditions(system, z, rank, solved)
+
+
+def _evenly_scaled(system: System, x: Array) -> tuple[System, Array]:
+    """Return the system in units in which rates depend evenly on all states, by Curtis & Reid's least squares, and x for it."""
+    batch, n = system.problem.batch("field"), len(system.problem.states)
+    given = system.nodes, system.states(x), np.empty((0, 0)), system.all_parameters(x)
+    slopes = np.abs(batch.jacobian(*given, batch.columns(()))[1][:, :n]).max(axis=0) * (1 - np.eye(n))
+    effects, causes = np.nonzero((slopes > 0) & np.isfinite(slopes))
+    logarithms, *_ = np.linalg.lstsq(np.eye(n)[effects] - np.eye(n)[causes], np.log(slopes[effects, causes]))
+    return system.with_scales(x, usual(np.exp(logarithms), True), system.scales.parameters)
 
 
 def of_family(system: System, x: Array) -> str:
@@ -454,7 +465,7 @@ def _named(system: System, rank: _Rank) -> tuple[str, bool]:
 def _is_shift(system: System, z: Array, moved: Array, level: float = APART) -> bool:
     """Return whether the null vector is the derivative of the solution by t."""
     given = system.nodes, system.states(z), moved[0, :0], system.all_parameters(z)
-    rates = system.problem.batch("field").values(*given)[:, : moved.shape[2]]
+    rates = system.problem.batch("field").values(*given)[:, : moved.shape[2]] / system.scales.states
     return len(moved) == 1 and bool(cosine(rates.ravel(), moved.ravel()) > 1 - level)
 
 

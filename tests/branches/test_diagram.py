@@ -319,7 +319,7 @@ def test_a_process_killed_while_it_sends_its_result():
 @pytest.mark.parametrize("method", [pytest.param("fork", marks=pytest.mark.forks("they are tested")), "spawn"])
 def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkeypatch, method):
     """Forked, or each from nothing as on Windows and macOS: the same bits as from one process."""
-    monkeypatch.setattr(executors, "_start_method", lambda: method)
+    monkeypatch.setattr(executors, "_START_METHOD", method)
     run_many(parse(PAIR, "scene"), tmp_path, Display(silent=True), workers=2)
     assert all(map(np.array_equal, computed_here, points_of(tmp_path)))
 

@@ -12,10 +12,6 @@ SEEDS = 3
 KNOWN = ("opt: folds",)
 
 
-#: The rank of first equations of very different sizes is judged without these sizes.
-_REFUSED = dict.fromkeys(range(SEEDS), "its first solution is refused")
-
-
 def complaints(name, seed, stated=False):
     module = units.restated(name, seed, stated)
     found = {case.name: units.complaint(module, case) for case in module.CASES}
@@ -33,6 +29,6 @@ def test_some_in_other_units(name):
 @pytest.mark.parametrize("name", units.NAMES)
 def test_sizes_stated(name, seed, request):
     """The whole bank."""
-    if known := {"bru": {2: "two branch points in one step"}, "int": _REFUSED, "spb": _REFUSED}.get(name, {}).get(seed):
-        request.applymarker(pytest.mark.xfail(reason=f"a known fault: {known}"))
+    if (name, seed) == ("bru", 2):
+        request.applymarker(pytest.mark.xfail(reason="a known fault: two branch points in one step"))
     assert complaints(name, seed, stated=True) == {}

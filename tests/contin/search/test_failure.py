@@ -1,5 +1,6 @@
 """Guesses from which Newton's method alone does not converge: each cause by two problems, with a closed form or the message."""
 
+import itertools
 import math
 
 import numpy as np
@@ -141,6 +142,23 @@ def test_a_sum_that_no_flux_leaves_open():
     text = message(no_flux(1.0), [0.0, 0.0], {"g": 0.5})
     assert "contradicts the others and the equations, so there is no solution" in text and "or add it and free g" in text
     assert solve(no_flux(1.0, both=True), [0.0, 0.0], {"g": 0.5}, free=["g"])["g"] == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("factors", list(itertools.product([1e-9, 1e9], repeat=4)))
+def test_units_decide_nothing(factors):
+    """The same with u, the flux and both conditions multiplied by anything: an open sum is found, and a held u never doubted."""
+    u_unit, flux_unit, *of_conditions = factors
+
+    def stated(held):
+        def ends(a, b, p):
+            return of_conditions[0] * a.flux / flux_unit, of_conditions[1] * (a.u / u_unit if held else b.flux / flux_unit)
+
+        return BoundaryValueProblem(
+            lambda t, u, p: (u_unit * u.flux / flux_unit, flux_unit * math.cos(math.pi * t)), ends, ["u", "flux"], {"f": 1.0}
+        )
+
+    assert at(solve(stated(True), [0.0, 0.0]), 1.0)[0] / u_unit == pytest.approx(2 / math.pi**2, abs=1e-12)
+    assert "follows from the others and the equations, and u is not determined" in message(stated(False), [0.0, 0.0])
 
 
 def test_a_free_beam():
