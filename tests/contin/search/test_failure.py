@@ -146,7 +146,7 @@ def test_a_sum_that_no_flux_leaves_open():
 
 @pytest.mark.parametrize("factors", list(itertools.product([1e-9, 1e9], repeat=4)))
 def test_units_decide_nothing(factors):
-    """The same with u, the flux and both conditions multiplied by anything: an open sum is found, and a held u never doubted."""
+    """The same with u, the flux and both conditions multiplied by anything: an open sum is found, a held u never doubted."""
     u_unit, flux_unit, *of_conditions = factors
 
     def stated(held):
