@@ -61,6 +61,7 @@ from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import BorderedMatrix, borders_at
 from contin.events.interpolated import meeting
 from contin.events.usual import Stationarity, curvatures
+from contin.levels import ROUGH
 from contin.linalg.border import Bordered, null_vectors, orthonormal, rows_fit
 
 #: w.F_mu is interpolated to the zero of w.F_lambda only where its first estimate there is below this part of its values at the
@@ -150,15 +151,13 @@ def _bend(trial: Trial) -> float:
     return -float(curve.once(curve.own_gradients, trial.x)[0] @ curve.null_vectors(trial.x)[0])
 
 
-def _may_be_cusp(arc: Arc) -> bool:
-    """Return whether the parameters reverse inside a step, as they do at a cusp, where they stand still.
+def _stands_still(trial: Trial) -> bool:
+    """Return whether the parameters stand still, as they do at a cusp, where the tangent is known.
 
     w.F_zz v v vanishes, too, where solutions have v as a symmetry, as the phase of a forced cycle whose forcing vanishes: there
-    the parameters go on. At a pitchfork of the folds they reverse as well.
+    the parameters go on.
     """
-    places = [arc.state.system.state_size, arc.state.system.size - 1]
-    before, behind = (trial.tangent[places] for trial in (arc.before, arc.trial))
-    return bool(before @ behind < 0) and _singular_point(arc) is None
+    return not np.abs(trial.tangent[[trial.system.state_size, -1]]).max() >= ROUGH
 
 
 def _by_first(trial: Trial) -> float:
@@ -185,8 +184,9 @@ def _singular_point(arc: Arc) -> list[SpecialPoint] | None:
 
 #: w.F_zz v v = 0.
 _CUSP: Event = Event(
-    Label.CUSP, "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [], asks=lambda arc: arc.passes(_CUSP)
-)
+    Label.CUSP, "cusp", _bend, confirm=_stands_still, search=lambda arc, _: None if _singular_point(arc) is None else [],
+    asks=lambda arc: arc.passes(_CUSP),
+)  # fmt: skip
 #: Where the fold meets a branch point: w.F_lambda = 0.
 _MEETS: Event = Event(
     Label.BRANCH_POINT, "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc),

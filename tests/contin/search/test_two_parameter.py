@@ -40,6 +40,19 @@ def test_every_point_of_a_fold_curve_through_a_cusp():
     assert folds.points[0]["mu"] > 0 > folds.points[-1]["mu"]
 
 
+@pytest.mark.parametrize("mu_unit", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("lam_unit", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+def test_a_cusp_in_any_units(mu_unit, lam_unit):
+    """At the cusp both parameters stand still; beside it the one in small units turns, whatever its share of the step is."""
+    problem = AlgebraicProblem(
+        lambda u, p: (p.mu / mu_unit + p.lam / lam_unit * u.x - u.x**3,), ["x"], {"mu": 0.0, "lam": lam_unit}
+    )
+    fold = trace(solve(problem, [-1.1]), free=["mu"], limits={"mu": (-3 * mu_unit, 3 * mu_unit)}).labelled("LP")[0]
+    found = curve(fold, "lam", direction=-1, limits={"lam": (-lam_unit, 2 * lam_unit)})
+    (merged,) = found.labelled("CP")
+    assert (merged["lam"] / lam_unit, merged["mu"] / mu_unit, merged["x"]) == pytest.approx((0, 0, 0), abs=1e-9)
+
+
 @pytest.mark.full
 def test_fold_curve_of_a_boundary_value_problem():
     """Every point of the curve is a fold of the branch at its eps; the two folds of eps = .2 merge in one cusp."""
