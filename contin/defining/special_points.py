@@ -111,11 +111,11 @@ class FoldCurve(Defining):
     def by_parameters(self, x: Array) -> tuple[float, float]:
         """Return the products of w with the derivatives of F by the parameter of the folds and by the second parameter.
 
-        The rows of the parameters that are held, and c, take up what w F_x leaves there.
+        The rows of the parameters that are held, and c, take up what w F_x leaves there. The sign does not hang on b: w may turn.
         """
         found, _, row = self.at(x)
         *held, rest = found.transposed[0, self.base.equations :]
-        products = -np.array(held) - rest * row[self._held]
+        products = -self._sign(x) * (np.array(held) + rest * row[self._held])
         return float(products[0]), float(products[-1])
 
     def own_values(self, x: Array) -> Array:

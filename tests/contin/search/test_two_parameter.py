@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from bank import opt
+from bank import opt, units
 from bank.closed_forms import cusp, elastica
 from bank.gelfand import perturbed_gelfand
 from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, solve, trace
@@ -51,6 +51,13 @@ def test_a_cusp_in_any_units(mu_unit, lam_unit):
     found = curve(fold, "lam", direction=-1, limits={"lam": (-lam_unit, 2 * lam_unit)})
     (merged,) = found.labelled("CP")
     assert (merged["lam"] / lam_unit, merged["mu"] / mu_unit, merged["x"]) == pytest.approx((0, 0, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 13, 15])
+def test_folds_that_meet_a_branch_point_in_other_units(seed):
+    """The left null vector turns by more than 90 degrees in one step there, where one equation has far larger units."""
+    restated = units.restated("opt", seed)
+    assert [units.complaint(restated, case) for case in restated.CASES] == ["", ""]
 
 
 @pytest.mark.full
