@@ -111,7 +111,7 @@ class FoldCurve(Defining):
     def by_parameters(self, x: Array) -> tuple[float, float]:
         """Return the products of w with the derivatives of F by the parameter of the folds and by the second parameter.
 
-        The rows of the parameters that are held, and c, take up what w F_x leaves there. The sign does not hang on b: w may turn.
+        The rows of the parameters that are held, and c, take up what w F_x leaves there. Its sign does not hang on b: w turns.
         """
         found, _, row = self.at(x)
         *held, rest = found.transposed[0, self.base.equations :]
