@@ -39,7 +39,8 @@ from contin.results.point import Point
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
-#: The length of a step, its beginning, its end with the judgement, and whether it is plain but for the error of its mesh.
+#: The length of a step, its beginning, its end with the judgement, and whether it is plain but for the error of its mesh, and
+#: for values that free parameters pass.
 Handed = tuple[float, Trial, Made, bool]
 #: Where steps on a mesh begin: factors, and their place in the lane.
 _Begun = tuple[Factorization, int]
@@ -235,7 +236,7 @@ class MeshLane(Lane):
                 begin = here if self._wants else self._trial(path, number - 1, before)
                 here = self._trial(path, number, after)
                 asks = self._asks(begin, here, path.numbers[number])
-            if asks or not error <= poor:
+            if asks or path.numbers[number, rules.PASSES] or not error <= poor:
                 if step <= 0:
                     self.spectra.moved[0] = np.inf
                 if step:
@@ -296,10 +297,8 @@ class MeshLane(Lane):
         """Keep a step that was made and asks for a closer look, with the factors at both ends, which the lane gives away."""
         sign, iterations, error = self._attempt.judged[[rules.SIGN, rules.UPDATES, rules.ERROR]].tolist()
         both[0].sign, both[1].sign = float(path.numbers[number - 1, rules.SIGN_OF]), sign
-        first, last = (
-            Linearization(tangent.copy(), factors.sign, factors)
-            for tangent, factors in zip(path.tangents[number - 1 : number + 1], both)
-        )
+        ends = zip(path.tangents[number - 1 : number + 1], both)
+        first, last = (Linearization(tangent.copy(), factors.sign, factors) for tangent, factors in ends)
         begin = Trial(self.system, path.x[number - 1].copy(), first)
         end = Trial(self.system, path.x[number].copy(), last, int(iterations), error)
         end._discretization_error = float(path.numbers[number, rules.MESH_ERROR]) or None  # 0 where it is not known yet
@@ -353,7 +352,7 @@ class Block:
     def state(self, row: int) -> State:
         """Return the state behind a step, by its row of the path."""
         base, (x, tangents, numbers) = self._base, self._path
-        step, following, sign, arclength, _, _, sense, told, error, _ = numbers[row].tolist()
+        step, following, sign, arclength, _, _, sense, told, error, *_ = numbers[row].tolist()
         sensed = self._free(x[int(told)]) if told else base.sensed
         # copies begin where all arrays do: some of OpenBLAS's kernels add up in an order that hangs on that
         there = x[row].copy(), tangents[row].copy(), tangents[row - 1].copy()
@@ -374,9 +373,8 @@ class Block:
         arclengths = (numbers[1 : self.made + 1, rules.ARCLENGTH] + numbers[2 : self.made + 2, rules.STEP]).tolist()
         told = numbers[2 : self.made + 2, (rules.ITERATIONS, rules.ERROR_LEFT, rules.MESH_ERROR)].tolist()
         indices = [None] * self.made if self._indices is None else self._indices
-        for row, given, arclength, (iterations, error, mesh_error), index in zip(
-            rows, values.tolist(), arclengths, told, indices
-        ):
+        every = zip(rows, values.tolist(), arclengths, told, indices)
+        for row, given, arclength, (iterations, error, mesh_error), index in every:
             point = object.__new__(Point)  # its own __init__ would take half of the time of a step
             vars(point).update(_REGULAR, parameters=dict(zip(names, given)))
             vars(point).update(x=x[row], tangent=tangents[row], system=system, arclength=arclength, errors={})

@@ -143,7 +143,7 @@ def plain_steps(rooms: Rooms, path: Path, accepted: int) -> int:
         for i in range(spectra.real.shape[1]):
             spectra.real[FIRST, i], spectra.imaginary[FIRST, i] = spectra.real[LAST, i], spectra.imaginary[LAST, i]
         step = _made(rooms, path, number)
-        if step == 0.0 or rules.asks(frame, attempt, control, watch, path, accepted, number, step):
+        if step == 0.0 or rules.asks(frame, attempt, control, watch, path, accepted, number, step) or now[rules.PASSES] == 1.0:
             return number - 2
         if watch.branch_points and not _calm(linear, quotient):
             return number - 2

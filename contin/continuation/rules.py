@@ -44,8 +44,8 @@ _LOOSE = 4.0
 NOISY = 1e-9
 #: Numbers of a row of `Path`: the step made and the next one; the determinant's sign, the arclength, Newton's updates and the
 #: error that they left; the sense of the primary parameter, and the row where it was told, 0 where that is none of these; the
-#: error of the mesh; and 1 where the first point may be near, as far as kernels tell.
-STEP, NEXT, SIGN_OF, ARCLENGTH, ITERATIONS, ERROR_LEFT, SENSE, SENSED, MESH_ERROR, CLOSES, NUMBERS = range(11)
+#: error of the mesh; and 1 where the first point may be near, as far as kernels tell, or a free parameter passes a value.
+STEP, NEXT, SIGN_OF, ARCLENGTH, ITERATIONS, ERROR_LEFT, SENSE, SENSED, MESH_ERROR, CLOSES, PASSES, NUMBERS = range(12)
 #: Places in ``Attempt.judged``: as in `Judgement`, then the determinant's sign, Newton's updates and the error that they left,
 #: and the error of the mesh.
 MISSED, TURN, LENGTH, COSINE, SIGN, UPDATES, ERROR, OF_MESH, JUDGED = range(9)
@@ -333,9 +333,9 @@ def first_length(frame: Frame, control: Control, path: Path, number: int) -> flo
 def asks(
     frame: Frame, attempt: Attempt, control: Control, watch: Watched, path: Path, accepted: int, number: int, step: float
 ) -> bool:
-    """Return whether an entry of the watch list asks for a closer look: all but those of branch points and eigenvalues.
+    """Return whether an entry of the watch list asks for a closer look: all but those of values, branch points and eigenvalues.
 
-    Whether the first point may be near is put into the numbers.
+    Whether a free parameter passes a value, and whether the first point may be near, is put into the numbers.
     """
     x, new, had, now, size = path.x[number - 1], path.x[number], path.numbers[number - 1], path.numbers[number], path.x.shape[1]
     if had[SIGN_OF] != attempt.judged[SIGN]:
@@ -347,7 +347,7 @@ def asks(
         scale = frame.sizes[at - frame.states]
         first, last = x[at] * scale - watch.values[k], new[at] * scale - watch.values[k]
         if not (first < 0 > last or first > 0 < last) or last * watch.sides[k] > 0:
-            return True
+            now[PASSES] = 1.0
     now[CLOSES] = 0.0
     if accepted + number - 2 >= FEWEST:
         one, other, begin = 0.0, 0.0, frame.states

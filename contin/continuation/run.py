@@ -378,8 +378,8 @@ class Continuation:
         while True:
             try:
                 arc, judgement = self._steps.attempt(self.state, self.here(), step, made)
-                inspection, poor = self._watch.inspection(arc), is_poor(arc.trial.settled, settings.mesh)
-                asks = not (plain and made) and self._watch.asks(inspection)
+                inspection, poor = self._watch.inspection(arc, plain and bool(made)), is_poor(arc.trial.settled, settings.mesh)
+                asks = self._watch.asks(inspection)
                 if poor and (asks or not self._meshes.ends_finer(arc, judgement)):
                     arc, judgement = self._meshes.good_step(self, arc, judgement)
                     asks = self._watch.asks(inspection := self._watch.inspection(arc))

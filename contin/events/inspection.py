@@ -104,11 +104,13 @@ class Sought(NamedTuple):
 
 
 class Inspection:
-    """The inspection of one step; what is looked for is found once."""
+    """The inspection of one step; what is looked for is found once. A ``plain`` one passes no branch point or first point."""
 
-    def __init__(self, arc: Arc, sought: Sought) -> None:
-        self.arc, self.sought = arc, sought
+    def __init__(self, arc: Arc, sought: Sought, plain: bool = False) -> None:
+        self.arc, self.sought, self.plain = arc, sought, plain
         self.branch_points = BranchPointSearch(arc)
+        if plain:
+            self.branch_points.count, self._returned = (0, True), None
 
     # --- special points ------------------------------------------------------------------------------------------
 

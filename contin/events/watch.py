@@ -46,7 +46,8 @@ class Watch:
         self.ends = [test for test in tests if test.terminal and not test.limit]
         held = [test for test in tests if test.holds_one_of(system.free)]
         self._asks: list[Asks] = [_determinant(settings.branch_points), Inspection.may_close]
-        self._asks += [_value(system.free.index(test.column), test) for test in held]
+        self._values: list[Asks] = [_value(system.free.index(test.column), test) for test in held]
+        self._asks += self._values
         self._asks += [_sign(test) for test in tests if test not in held]
         #: Those of the equations, which are singular where a kind of problem knows its branch to end, and others.
         self._of_equations: list[Doubts] = [_unclear] if settings.branch_points else []
@@ -73,15 +74,15 @@ class Watch:
         if fold is not None:
             self._asks.append(lambda inspection: may_turn(inspection.arc, fold))
             self._doubts.append(_lost_fold(fold.name))
-        self._sought = Sought(settings, start, tests, fold, homes)
+        self._sought, self._values_sought = Sought(settings, start, tests, fold, homes), Sought(settings, start, held, None, ())
 
-    def inspection(self, arc: Arc) -> Inspection:
-        """Return the inspection of a step."""
-        return Inspection(arc, self._sought)
+    def inspection(self, arc: Arc, plain: bool = False) -> Inspection:
+        """Return the inspection of a step; a ``plain`` one can only pass values of free parameters."""
+        return Inspection(arc, self._values_sought if plain else self._sought, plain)
 
     def asks(self, inspection: Inspection) -> bool:
         """Return whether a step must be looked at closely, by what both its ends say."""
-        return any(asks(inspection) for asks in self._asks)
+        return any(asks(inspection) for asks in (self._values if inspection.plain else self._asks))
 
     def doubt(self, inspection: Inspection) -> str:
         """Return why a step cannot be believed, as a clause; "" where it can.
@@ -91,7 +92,7 @@ class Watch:
         home = inspection.home
         known = home is not None and home.is_located and not home.is_trivial  # what the equations say there is blurred
         doubts = self._doubts if known else [*self._of_equations, *self._doubts]
-        return next((clause for says in doubts if (clause := says(inspection))), "")
+        return "" if inspection.plain else next((clause for says in doubts if (clause := says(inspection))), "")
 
     def ends_inside(self, arc: Arc) -> bool:
         """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted.
@@ -130,8 +131,7 @@ def _value(place: int, test: Event) -> Asks:
         system = trial.system
         at, size = system.state_size + place, system.free_scales[place]
         first, last = before.x[at] * size - value, trial.x[at] * size - value
-        same = first < 0 > last or first > 0 < last
-        return not same or (test.limit and trial.value(test) >= 0)
+        return not (first < 0 > last or first > 0 < last) or (test.limit and trial.value(test) >= 0)
 
     return asks
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import contin.events.inspection as inspection
 from bank import abc, enz, pp2
 from bank.closed_forms import bratu, bratu_fold, pitchfork
 from contin import AlgebraicProblem, CycleProblem, Event, Settings, solve, trace
@@ -37,6 +38,15 @@ def test_folds_beside_a_branch_point(options):
     for direction in (1, -1):
         branch = trace(enz.equal().labelled("BP")[0], branch=1, direction=direction, limits={"s0": (-1, 36)}, **options)
         assert labels(branch) == ["LP", "LP", "BP", "LP", "LP", "EP"]
+
+
+def test_steps_on_a_mesh_that_only_pass_values_are_searched_for_nothing_else(monkeypatch):
+    """No search for branch points along Bratu's problem, where the steps to three values and the limit are plain otherwise."""
+    start, counted, count = solve(bratu(), [0.0, 0.0], intervals=8), [], inspection.BranchPointSearch._counted
+    monkeypatch.setattr(inspection.BranchPointSearch, "_counted", lambda *given: counted.append(given) or count(*given))
+    branch = trace(start, free=["lam"], limits={"lam": (0, 3.25)}, zeros={"lam": [1.0, 2.0, 3.0]})
+    assert labels(branch) == ["UZ", "UZ", "UZ", "EP"] and not counted
+    assert [point["lam"] for point in branch.labelled("UZ")] == pytest.approx([1, 2, 3], abs=1e-13)
 
 
 @pytest.mark.parametrize("step", [0.05, 0.5, 2.0])
