@@ -276,8 +276,9 @@ class PeriodicCollocation(OfCycles, Collocation):
         return self._compared(x)[0]
 
     def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
-        """Return the logarithms of the multipliers at several places."""
-        return [self.eigenvalues(x) for x in places]
+        """Return the logarithms of the multipliers at several places, but for the one that is 1: it moves by errors only."""
+        found = [self.eigenvalues(x) for x in places]
+        return [np.delete(values, np.abs(values).argmin()) for values in found] if self.autonomous else found
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""

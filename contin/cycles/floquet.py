@@ -155,14 +155,14 @@ def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
     return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
 
 
-def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = LOCATED) -> int:
+def unstable(system: PeriodicCollocation | MapSystem, x: Array) -> int:
     """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
 
-    Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:
+    Multipliers whose logarithm is below 1e-9 are left out, too, and those as near to 1 as the one that is 1 by its error:
     in a conservative system the mesh parts a double one to both sides.
     """
     values, trivial = system.eigenvalues(x), _trivial(system, x)
-    outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= least)
+    outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= LOCATED)
     if trivial is not None:
         outside &= np.abs(values) > AS_FAR * abs(values[trivial])
     return int(np.count_nonzero(outside))
@@ -251,9 +251,9 @@ def _comes_near(arc: Arc, what: int) -> bool:
 
 @functools.lru_cache(maxsize=4)
 def _without_trivial(trial: Trial) -> ComplexArray:
-    """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
-    values, trivial = trial.system.eigenvalues(trial.x), _trivial(trial.system, trial.x)
-    return values if trivial is None else np.delete(values, trivial)
+    """Return the logarithms of the multipliers of a cycle, with their round-off, but for the one that is 1."""
+    values: ComplexArray = trial.system.computed_eigenvalues(trial.x)
+    return np.delete(values, np.abs(values).argmin()) if trial.system.autonomous else values
 
 
 def keep_off_one(arc: Arc) -> bool:
@@ -285,8 +285,9 @@ def torus() -> Event:
 
 
 def _may_twist(arc: Arc) -> bool:
-    """Return whether there may be torus bifurcations inside a step."""
-    return _unstable(arc.before) != _unstable(arc.trial) or _comes_near(arc, CIRCLE)
+    """Return whether there may be torus bifurcations inside a step, where a pair passes the circle, no single one."""
+    before, behind = (int(np.count_nonzero(_without_trivial(trial).real > 0)) for trial in (arc.before, arc.trial))
+    return abs(before - behind) > 1 or _comes_near(arc, CIRCLE)
 
 
 def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
@@ -295,12 +296,6 @@ def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
         return []
     found = hopf_points(arc, knots)  # the pair must lie inside the circle on one side, and outside on the other
     return [_doubtful(each) for each in found if not each.is_located or passes(arc, each.at, each.details["frequency"])]
-
-
-@functools.lru_cache(maxsize=4)
-def _unstable(trial: Trial) -> int:
-    """Return the number of unstable multipliers of a cycle, however near to the circle."""
-    return unstable(trial.system, trial.x, 0.0)
 
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:

@@ -9,6 +9,7 @@ import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
 from contin.continuation import plain_on_mesh
 from contin.cycles import equations as cycles
+from contin.cycles import floquet
 from contin.events import hopf
 from contin.search import motions, orbits
 
@@ -271,6 +272,17 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)
     assert branch.points[-1].name == "r = 16" and not branch.labelled("PD") and not branch.labelled("TR")
     assert len(calls) - 2 * 6 < 4 * len(branch)
+
+
+def test_one_multiplier_that_leaves_1_is_no_pair(monkeypatch):
+    """Beside the Hopf point of the Lorenz equations it is 1 up to round-off, and outside the circle at the end of the step."""
+    monkeypatch.setattr(floquet, "hopf_points", lambda *_: pytest.fail("a torus bifurcation is searched for"))
+    rest = contin.solve(AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 24.0}), [math.sqrt(8 / 3 * 23)] * 2 + [23.0])
+    (hopf,) = contin.trace(rest, free=["r"], limits={"r": (20, 26)}).labelled("HB")
+    mesh, newton = MeshControl(min_intervals=27, max_intervals=27), contin.Newton(1e-8)
+    branch = contin.trace(hopf, branch=1, limits={"r": (20, 25)}, mesh=mesh, newton=newton, errors=False)
+    assert [point.label for point in branch if point.label] == ["HB", "EP"]
+    assert branch[1].floquet().unstable == 1
 
 
 def test_a_multiplier_that_has_drifted_from_1_needs_no_closer_look(monkeypatch):
