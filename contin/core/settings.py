@@ -197,10 +197,10 @@ class Options(TypedDict, total=False):
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
     """Return the settings with some fields changed; raise ProblemError for an unknown field, or a value that it cannot have."""
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
-    options, settings = _by_new_name(options), settings or Settings()
+    options, known = _by_new_name(options), settings or Settings  # the class has the usual values
     if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
-        options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}
-    return dataclasses.replace(settings, **options)
+        options = {**options, "step": min(known.step, max(options["max_step"], known.min_step))}
+    return Settings(**options) if settings is None else dataclasses.replace(settings, **options)
 
 
 #: First names of the field ``events``, which stay for one version.
