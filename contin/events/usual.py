@@ -16,7 +16,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -43,23 +42,23 @@ def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[Event]:
     return [_user_zero(name, value, text) for name, values in zeros.items() for value, text in value_names(values).items()]
 
 
+@functools.lru_cache(maxsize=256)  # runs of one diagram have the same ones
 def _user_zero(name: str, value: float, text: str) -> Event:
     return Event(Label.USER_ZERO, f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
 
 
 def limits(intervals: Mapping[str, Sequence[float]]) -> list[Event]:
     """Return the test functions that end a run where a parameter or functional reaches an end of its interval."""
-    result = []
-    for name, (low, high) in intervals.items():
-        texts = value_names((low, high))
-        result += [_limit(name, low, texts[low], -1), _limit(name, high, texts[high], 1)]
-    return result
+    ends = [(name, end, side) for name, (low, high) in intervals.items() for end, side in ((low, -1), (high, 1))]
+    texts = {name: value_names(both) for name, both in intervals.items()}
+    return [_limit(name, end, texts[name][end], side) for name, end, side in ends]
 
 
+@functools.lru_cache(maxsize=256)
 def _limit(name: str, value: float, text: str, side: int) -> Event:
     """Return the one of the upper (``side`` +1) or lower (-1) end."""
-    given: Any = {"terminal": True, "limit": True, "column": name, "value": value}
-    return Event(Label.END, f"{name} = {text}", lambda trial: side * (trial[name] - value), **given)
+    what = f"{name} = {text}"
+    return Event(Label.END, what, lambda trial: side * (trial[name] - value), True, limit=True, column=name, value=value)
 
 
 def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
