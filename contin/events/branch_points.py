@@ -60,44 +60,45 @@ class BranchPointSearch:
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
         """How many branch points the step passes, and whether that is clear."""
-        kept = self.arc.before.factors is not None  # bordered by a row of the step before: the branch goes on along it, too
-        inside = functools.cache(lambda part: self._bordered(part, self.arc.state.row[None]))
-        counted = self._counted(kept, inside)
-        if kept and counted != (0, True):  # where it is expected is told by the step alone, however the run began
-            self.arc.before.refactor(self.arc.state.row)
-            counted = self._counted(False, inside)
-        return counted
-
-    def _counted(self, kept: bool, inside: Callable[[float], Factors]) -> tuple[int, bool]:
-        """Return the count, with the factors at the start of the step that are kept, or with new ones, and those inside it."""
-        state, before, trial = self.arc.state, self.arc.before, self.arc.trial
-        size, same = state.system.size, same_sign(before.sign, trial.sign)
-        if before.factors is None:
-            if same and state.system.cannot_branch(self.arc):
-                return 0, True
-            before.refactor(state.row)
-        known = known_quotients(before.factors, trial.factors, size)
-        if known is not None and (decided := self._decided(known, shares(known))):
-            return decided
-        if kept and same and state.system.cannot_branch(self.arc):
+        arc, before = self.arc, self.arc.before
+        inside = functools.cache(lambda part: self._bordered(part, arc.state.row[None]))
+        if before.factors is None and self._cannot_branch:
             return 0, True
-        if known is None:
-            ends = {0.0: before.factors, 1.0: trial.factors}
-            along = quotients_along(lambda part: ends.get(part) or inside(part))
-            if along is not None and (decided := self._decided(*along)):
-                return decided
-            if same and changes_little(before.factors, trial.factors, size):
-                return 0, True
-            if self._without_smallest is not None:
-                return self._without_smallest
-        if kept:
-            return 0, False
-        values = quotients(before.factors, trial.factors, size)
+        # Kept factors only tell that there is none: where one is expected must not depend on digits that a resumed run has not.
+        if before.factors is not None and self._counted(inside) == (0, True):
+            return 0, True
+        before.refactor(arc.state.row)
+        if counted := self._counted(inside):
+            return counted
+        values = quotients(before.factors, arc.trial.factors, arc.state.system.size)
         count, clear = crossings(values)
         if (count > 1 or not clear) and self._without_smallest is not None:
             return self._without_smallest
         self._shares = np.sort(shares(values[values.real < 0]))
         return count, clear and (not self._says_sign or (count % 2 == 1) == self._sign_changes)
+
+    @property
+    def _cannot_branch(self) -> bool:
+        """Both ends of the step say that no other branch crosses this one."""
+        return same_sign(self.arc.before.sign, self.arc.trial.sign) and self.arc.state.system.cannot_branch(self.arc)
+
+    def _counted(self, inside: Callable[[float], Factors]) -> tuple[int, bool] | None:
+        """Return the count, from factors at both ends of the step and ``inside`` it; None if it takes the whole matrices."""
+        before, trial, size = self.arc.before, self.arc.trial, self.arc.state.system.size
+        known = known_quotients(before.factors, trial.factors, size)
+        if known is not None and (decided := self._decided(known, shares(known))):
+            return decided
+        if self._cannot_branch:
+            return 0, True
+        if known is not None:
+            return None
+        ends = {0.0: before.factors, 1.0: trial.factors}
+        along = quotients_along(lambda part: ends.get(part) or inside(part))
+        if along is not None and (decided := self._decided(*along)):
+            return decided
+        if same_sign(before.sign, trial.sign) and changes_little(before.factors, trial.factors, size):
+            return 0, True
+        return self._without_smallest
 
     def _decided(self, values: ComplexArray, places: Array) -> tuple[int, bool] | None:
         """Return the count, and keep where a branch point is expected, if quotients show one or none, as the sign does."""
@@ -188,8 +189,7 @@ class BranchPointSearch:
     @functools.cached_property
     def simple(self) -> SpecialPoint:
         """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
-        arc = self.arc
-        low, high = arc.low, arc.step
+        arc, low, high = self.arc, self.arc.low, self.arc.step
         middle = low + self._share * (high - low)
         for number in range(_HALVINGS + 1):
             if number % _BETWEEN == 0:
@@ -214,8 +214,8 @@ class BranchPointSearch:
         if not (inside and found.gap < (_GAP if state.system.intervals else _GAP_WITHOUT_MESH) and arc.passes_by(x, at)):
             return None
         direction = arc.direction(at) if system is state.system else state.system.carrier(system)(arc.direction(at))
-        found = found.along(system, direction)
-        return SpecialPoint(at, Label.BRANCH_POINT, "", Trial.without_tangent(system, found.x), details=found)
+        trial = Trial.without_tangent(system, found.x)
+        return SpecialPoint(at, Label.BRANCH_POINT, "", trial, details=found.along(system, direction))
 
     def _near(self, at: float) -> tuple[BranchPoint, Any]:
         """Return the branch point near a place and its system: where conditions switch, on a mesh with frozen outcomes."""
@@ -236,8 +236,7 @@ class BranchPointSearch:
         """The multiple point inside the step, where several singular values vanish together; "possible" where they do not."""
         from contin.events.multiple_point import MultiplePoint, locate_multiple_point  # most branches have none
 
-        arc = self.arc
-        state, step = arc.state, arc.step
+        arc, state, step = self.arc, self.arc.state, self.arc.step
         count, middle = self.count[0], arc.low + self._share * (step - arc.low)
         with contextlib.suppress(ConvergenceError):
             if np.ptp(self._shares) < _TOGETHER and not self._apart(middle):
@@ -260,6 +259,5 @@ class BranchPointSearch:
         there = arc.at(middle)
         there.refactor(arc.state.row)
         values = quotients(arc.before.factors, there.factors, arc.state.system.size)
-        passing, vanishing = passed(values)
-        places = shares(values[passing | vanishing])
+        places = shares(values[np.logical_or(*passed(values))])
         return 0 < len(places) < count or (len(places) == count and float(np.ptp(places)) > _TOGETHER)

@@ -85,12 +85,12 @@ class _Found(NamedTuple):
 
 
 def refined(point: SpecialPoint, settings: Settings) -> Refined:
-    """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
+    """Return a special point on the finest of some meshes, and by how much its free parameters may be off there.
 
-    The first finer mesh is made for the tolerance if the error is above it. Without a mesh the point is located once more, a
-    branch point by `BranchPoint.round_off`. A point far from the coarse one, or with another kernel, is lost. What is left
-    after two moves, of a branch point after one, follows from the last one by its order. A point that moves hardly less than
-    before, or hardly more than Newton's method leaves, moves by round-off. If it moves further, it stays on the mesh before.
+    1. Locate it on a finer mesh (`_on_made_mesh`, then halved). Far from the coarse point, or with another kernel, it is lost.
+    2. Tell from its move what is left: by `_part_left` or, of two moves or by own equations, `_part_by_order`.
+    3. Repeat until that is within the mesh tolerance, or the point moves by round-off: hardly less than before, or hardly more
+       than Newton's method leaves. If it moves further, it stays on the mesh before.
     """
     trial, details, before, last, seen, known = point.trial, point.details, np.zeros(1), np.inf, None, None
     errors = dict.fromkeys(trial.system.free, np.nan)
@@ -101,12 +101,12 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         now = _on_switches(point, _Found(trial, details, slope=point.slope), settings.newton)
     except ConvergenceError:
         return Refined(trial, errors, details, is_lost=True)
-    (trial, details, *_), is_lost, stays = now, False, isinstance(now.details, BranchPoint) and not trial.system.intervals
+    (trial, details, *_), is_lost = now, False
     for number in range(_HALVINGS):
         coarse = trial.system
         made = None if number else _on_made_mesh(point, now, settings)
         try:
-            again = made or (now if stays else _again(point, now, coarse.refined() or (coarse, np.array), settings.newton))
+            again = made or _again(point, now, coarse.refined() or (coarse, np.array), settings.newton)
             better, found, left, _ = now = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
             is_lost = last == np.inf and isinstance(error, Elsewhere)
@@ -118,7 +118,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             steps = moves * _part_left(trial, better)
             if holds and not system.on_curve:
                 steps = np.minimum(steps, _SAFE * better.discretization_error * size)  # no place adds to the error
-        elif not seen and system.intervals and finding_of(found).has_equations:  # its round-off is added below
+        elif not seen and system.intervals and finding_of(found).has_equations:
             steps = moves * _part_by_order(1.0, 1.0, 0.0, system.degree)
         moved = float(np.max((steps := np.maximum(steps, least)) / size))
         if np.any(steps > _FAR * size):
@@ -231,11 +231,13 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> _Found:
 
 
 def _again(point: SpecialPoint, coarse: _Found, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
-    """Return the special point and its details on another mesh.
+    """Return the special point and its details on another mesh, or located again, unless its `round_off` shows as much.
 
     Raises ConvergenceError where it was not found, or another one was.
     """
     (system, carry), (trial, details, _, slope) = finer, coarse
+    if system is trial.system and isinstance(details, BranchPoint):
+        return coarse
     if details is None and point.label == Label.BRANCH_POINT and point.test is None:  # a first point: its kernel is not known
         found: Any = locate_branch_point(system, carry(trial.x), newton)
         return _Found(found.there(system, carry(trial.tangent)), found)
