@@ -685,8 +685,8 @@ class Collocation(Composed):
         return {}
 
     @functools.cached_property
-    def _codes(self) -> dict[int, Codes]:
-        """By thread; copies on other meshes have the same."""
+    def _codes(self) -> dict[int, tuple[Codes, Projections]]:
+        """By thread; copies on other meshes have the same: each call of a kernel fills in its own spaces."""
         return {}
 
     def _made_workspace(self, thread: int) -> Workspace | None:
@@ -698,8 +698,8 @@ class Collocation(Composed):
         numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
         if is_large(numbers):
             return None
-        codes = self._codes[thread] = self._codes.get(thread) or codes_of(self)
-        return workspace(self, codes, rows)
+        shared = self._codes[thread] = self._codes.get(thread) or (codes_of(self), self.projections)
+        return workspace(self, *shared, rows)
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""

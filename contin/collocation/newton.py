@@ -95,7 +95,7 @@ def codes_of(system: Any) -> Codes:
     return Codes(field.load(), field.load(of_field), ends.load(), ends.load(of_ends))
 
 
-def workspace(system: Any, codes: Codes, rows: int) -> Workspace:
+def workspace(system: Any, codes: Codes, projections: Projections, rows: int) -> Workspace:
     """Return the work space of a system on a mesh with so many linear conditions besides, which each call fills."""
     n, field, ends, (of_field, of_ends) = system._n, system._field, system._boundary, system._columns
     whole = system._segments(0)
@@ -109,7 +109,7 @@ def workspace(system: Any, codes: Codes, rows: int) -> Workspace:
         np.zeros((points, field.count, of_field.width)), empty((1, ends.count)), np.zeros((1, ends.count, of_ends.width)),
         empty((rows, system.size)), empty(rows), empty((0, system._conditions + rows - 1)), empty((1, system.size)),
         empty((1, system.size)),
-        empty((0, n)), empty((0, 0, 0)), np.zeros(1), system.projections,
+        empty((0, n)), empty((0, 0, 0)), np.zeros(1), projections,
     )  # fmt: skip
     return Workspace(codes, mesh, values)
 
