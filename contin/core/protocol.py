@@ -14,7 +14,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.collocation.corners import NOWHERE, Switching
 from contin.collocation.mesh import MeshControl
-from contin.core.differences import of_function
+from contin.core.differences import derivative, of_function
 from contin.linalg.blocks import Factors
 from contin.problems.statement import Statement
 
@@ -131,6 +131,21 @@ class Discretization(Equations, Protocol):
         Kinds of system that state no derivatives of F of higher order have differences of the residual, along lines.
         """
         return of_function(self.residual, x, directions)
+
+    @abstractmethod
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
+
+        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
+        differences of `transposed_product`.
+        """
+        longest = np.abs(v).max(initial=0.0)
+        if not longest:
+            return np.zeros(self.size)
+        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
 
     def magnitudes(self, x: Array) -> Array:
         """Return the sizes of the unknowns relative to which x must be known, shape (size,).

@@ -311,17 +311,6 @@ class System(Discretization):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
 
-    def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
-
-        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
-        differences of `transposed_product`.
-        """
-        longest = np.abs(v).max(initial=0.0)
-        if not longest:
-            return np.zeros(self.size)
-        return derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
-
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
         """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
         longest = np.abs(v).max(initial=0.0)
@@ -375,10 +364,6 @@ class System(Discretization):
     def on_switches(self, x: Array, closely: bool = False) -> tuple[System, Carrier] | None:
         """Return the same problem on a mesh with the places of `switching` among its points; None where there is no need."""
         return None
-
-    @abstractmethod
-    def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
 
     @abstractmethod
     def with_parameters(self, values: Mapping[str, float]) -> System:

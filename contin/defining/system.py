@@ -25,7 +25,6 @@ import numpy as np
 
 from contin.arrays import Array, Function
 from contin.collocation.mesh import MeshControl
-from contin.core.differences import of_function
 from contin.core.labels import Label
 from contin.core.protocol import Carrier, Discretization
 from contin.core.system import System
@@ -196,11 +195,11 @@ class Defining(Discretization):
         residual, factors = self.base.linearize(self.inside(x), np.concatenate([top, rows]), beside)
         return self._residual(x, residual), factors
 
-    def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F and g along several directions: that of g by differences."""
-        if self.own_unknowns:
-            return super().along(x, directions)
-        return np.append(self.base.along(x, directions), of_function(self.own_values, x, directions))
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return the product of w with all derivatives of F + psi z and g, shape (size,)."""
+        count = self.base.equations
+        inside = np.append(self.base.transposed_product(self.inside(x), w[:count]), self.own_vectors(x) @ w[:count])
+        return inside + w[count:] @ self.once(self.own_gradients, x)
 
     def events(self) -> list[Event]:
         """Return that of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.

@@ -92,10 +92,8 @@ class BorderedMatrix:
 
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
-        w, kernel, system = self.multipliers(), self.kernel, self._system
-        if hasattr(system, "bent"):
-            return -np.array([system.bent(x, w, v) for v in kernel]) @ kernel.T
-        return np.array([[float(-w @ system.along(x, (a, b))) for b in kernel] for a in kernel])
+        w = self.multipliers()
+        return -np.array([self._system.bent(x, w, v) for v in self.kernel]) @ self.kernel.T
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:

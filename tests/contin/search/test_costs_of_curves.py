@@ -26,16 +26,22 @@ def extrema():
     return curve(branch.labelled("LP")[0], "eps", limits={"eps": (0.15, 0.25)})
 
 
-@pytest.mark.parametrize("made", [cusp, extrema])
-def test_derivatives_along_directions(made):
-    """They agree with differences of the whole residual, whose errors are 1e-6 of second order and 1e-4 of third."""
+@functools.cache
+def pitchforks():
+    """Branch points of x' = lam x - mu x^2 - mu x^3: lam = 0."""
+    problem = AlgebraicProblem(lambda u, p: (p.lam * u.x - p.mu * u.x**2 - u.x**3 * p.mu,), ["x"], {"mu": 1.0, "lam": 1.0})
+    return curve(trace(solve(problem, [0.0]), free=["lam"], limits={"lam": (-1, 1)}, direction=-1).labelled("BP")[0], "mu")
+
+
+@pytest.mark.parametrize("made", [cusp, extrema, pitchforks])
+def test_second_derivatives(made):
+    """They agree with differences of the whole residual, whose errors are 1e-6."""
     point = made().points[2]
     random = np.random.default_rng(3)
-    for count, error in ((2, 1e-5), (3, 1e-3)):
-        directions = random.standard_normal((count, point.x.size))
-        wanted = of_function(point.system.residual, point.x, directions)
-        found = point.system.along(point.x, directions)
-        assert found == pytest.approx(wanted, rel=error, abs=error * np.abs(wanted).max())
+    a, b = random.standard_normal((2, point.x.size))
+    w = random.standard_normal(point.system.equations)
+    wanted = w @ of_function(point.system.residual, point.x, (a, b))
+    assert point.system.bent(point.x, w, a) @ b == pytest.approx(wanted, rel=1e-5)
 
 
 def test_both_ends_of_a_step_are_kept():
