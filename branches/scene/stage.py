@@ -206,9 +206,8 @@ def _changes(run: Continuation) -> Iterator[tuple[str, State, Settings]]:
             yield f"steps.smallest: {smallest:g}", state, dataclasses.replace(settings, min_step=smallest)
     if not state.system.intervals:
         return
-    system, carry = state.system.refined()
-    previous = None if state.previous_tangent is None else carry(state.previous_tangent)
-    finer = dataclasses.replace(state, system=system, x=carry(state.x), tangent=carry(state.tangent), previous_tangent=previous)
+    finer = state.carried(*state.system.refined())
+    system = finer.system
     if system.intervals <= settings.mesh.max_intervals and settings.mesh.every:
         mesh = dataclasses.replace(settings.mesh, tolerance=settings.mesh.tolerance / _SHORTER)
         yield f"mesh.tolerance: {mesh.tolerance:g}", finer, dataclasses.replace(settings, mesh=mesh)

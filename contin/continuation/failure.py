@@ -127,12 +127,7 @@ def _mesh_advice(system: Discretization, settings: Settings) -> str:
 def _on_finer_mesh(state: State) -> State | None:
     """Return the state on the mesh halved, not corrected; None where there is no mesh."""
     finer: Any = state.system.refined()
-    if finer is None:
-        return None
-    system, carry = finer
-    tangent = carry(state.tangent)
-    previous = None if state.previous_tangent is None else carry(state.previous_tangent)
-    return dataclasses.replace(state, system=system, x=carry(state.x), tangent=tangent, previous_tangent=previous)
+    return None if finer is None else state.carried(*finer)
 
 
 def _goes_on(state: State, settings: Settings, way: float) -> bool:

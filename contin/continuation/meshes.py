@@ -159,21 +159,19 @@ class MeshPolicy:
         fewer intervals is not good enough.
         """
         newton, (system, carry) = self.steps.settings.newton, other
-        tangent = carry(state.tangent)
-        length = float(np.sqrt(inner(system, tangent, tangent)))
-        tangent /= length
-        previous, step = None if state.previous_tangent is None else carry(state.previous_tangent), state.step
+        moved = state.carried(system, carry)
+        length = float(np.sqrt(inner(system, moved.tangent, moved.tangent)))
+        moved = dataclasses.replace(moved, tangent=moved.tangent / length)
         if system.scales is not state.system.scales:
-            previous, step = None, float(np.clip(step * length, self.steps.settings.min_step, self.steps.settings.max_step))
-        x, row = carry(state.x), system.weights * tangent
+            step = float(np.clip(state.step * length, self.steps.settings.min_step, self.steps.settings.max_step))
+            moved = dataclasses.replace(moved, previous_tangent=None, step=step)
+        x, row = moved.x, moved.row
         if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
-            return dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step), None
+            return moved, None
         try:
             if carry is np.array and system.holds(x, newton.tolerance):  # the mesh stays: x is the same point, not only near it
                 end = Trial(system, x, linearization(system, x, row))
-                return dataclasses.replace(
-                    state, system=system, x=x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
-                ), end
+                return dataclasses.replace(moved, tangent=end.tangent, sign=end.sign), end
             done = correct(system, x, row, row @ x, newton, within=np.inf)
             end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
             system.check_jumps(end.x, state, False)
@@ -186,9 +184,7 @@ class MeshPolicy:
             return None  # the next point will do as well
         if name is not None and jumped(before, end, name, newton):
             return None
-        return dataclasses.replace(
-            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
-        ), end
+        return dataclasses.replace(moved, x=end.x, tangent=end.tangent, sign=end.sign), end
 
     def good_step(self, run: Place, arc: Arc, judgement: Judgement) -> tuple[Arc, Judgement]:
         """Make a step again until its end has an error within the tolerance of the mesh, as far as finer ones help.

@@ -20,7 +20,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.newton import Corrected, Newton, correct
-from contin.core.protocol import Discretization, inner
+from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.small import corrected_small
 from contin.core.trial import Linearization, Trial, linearization, linearization_of
 from contin.errors import ConvergenceError
@@ -92,6 +92,11 @@ class State:
     def row(self) -> Array:
         """The row that borders F_x: its product with a vector is the inner product with the tangent."""
         return self.system.weights * self.tangent
+
+    def carried(self, system: Discretization, carry: Carrier) -> State:
+        """Return the state on another system, not corrected there."""
+        tangent, before = carry(self.tangent), None if self.previous_tangent is None else carry(self.previous_tangent)
+        return dataclasses.replace(self, system=system, x=carry(self.x), tangent=tangent, previous_tangent=before)
 
 
 def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -> State:
