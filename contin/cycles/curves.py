@@ -79,7 +79,7 @@ class DoublingCurve(MultiplierCurve):
     def events(self) -> list[Event]:
         """Return those of a second multiplier -1, of generalized period doublings, and of folds."""
         own = [_second_doubling(), degenerate("GPD", "generalized period doubling")]
-        return [*super().events(), *own, *([_at_fold("LPPD", "fold-flip")] if self.base.intervals else [])]
+        return [*super().events(), *own, *_at_fold(self, "LPPD", "fold-flip")]
 
 
 class TorusCurve(MultiplierCurve):
@@ -118,7 +118,7 @@ class TorusCurve(MultiplierCurve):
     def events(self) -> list[Event]:
         """Return those of strong resonances, Chenciner points, and folds."""
         own = [*(_resonance(label, kappa) for label, kappa in RESONANCES.items()), degenerate("CH", "Chenciner")]
-        return [*super().events(), *own, *([_at_fold("LPTR", "fold-torus")] if self.base.intervals else [])]
+        return [*super().events(), *own, *_at_fold(self, "LPTR", "fold-torus")]
 
 
 def normal_product(v: Array, w: Array, noise: float = NORMAL) -> float:
@@ -138,17 +138,18 @@ def _second_doubling() -> Event:
     return Event("R2", "resonance 1:2", double)
 
 
-def _at_fold(label: str, name: str) -> Event:
-    """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
+def _at_fold(curve: Any, label: str, name: str) -> list[Event]:
+    """Return the test function of points at a fold, too: two multipliers are one, up to a square root. None if none is left."""
 
     def confirm(trial: Trial) -> bool:
-        curve: Any = trial.system
+        curve = trial.system
         exponents = curve.base.eigenvalues(curve.inside(trial.x))
         own = 2 * (curve.own_unknowns and curve.frequency(trial.x) < ROUGH)  # the pair itself is one at R1
         known = int(curve.base.autonomous) + own
         return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < ROUGH)
 
-    return Event(label, name, lambda trial: cast(MultiplierCurve, trial.system).fold(trial.x), confirm=confirm)
+    left = curve.base.intervals and len(curve.problem.states) > curve.own_equations + curve.base.autonomous
+    return [Event(label, name, lambda trial: trial.system.fold(trial.x), confirm=confirm)] if left else []
 
 
 def _resonance(label: str, kappa: float) -> Event:
@@ -183,7 +184,7 @@ def _change(trial: Trial) -> float:
 def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
     """Return the test functions of points where a further multiplier is one, or another is -1.
 
-    The change of g with the multiplier vanishes where a further one is one.
+    The change of g with the multiplier vanishes where a further one is one. None where there are no others.
     """
     autonomous, noise = cycles.autonomous, NORMAL if cycles.intervals else ROUND_OFF
     critical = 1 + autonomous
@@ -201,4 +202,5 @@ def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
         multipliers.imag[np.abs(multipliers.imag) <= CORRECTED * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]
+    found = [Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]
+    return found if len(cycles.problem.states) > critical else []

@@ -461,7 +461,7 @@ class Algebraic(Spectral, Composed):
         return [
             Event(Label.BOGDANOV_TAKENS, "Bogdanov-Takens", double_zero),
             Event(Label.ZERO_HOPF, "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
-        ]
+        ][: self.state_size - 1]  # a second eigenvalue takes two states, a pair three
 
     def form(self, x: Array) -> Any:
         """Return the characteristic matrix and the forms at an equilibrium."""

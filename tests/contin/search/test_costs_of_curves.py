@@ -9,6 +9,7 @@ from bank.gelfand import perturbed_gelfand
 from contin import AlgebraicProblem, CycleProblem, curve, cycle, solve, trace
 from contin.core.differences import of_function
 from contin.core.newton import Newton, correct
+from contin.cycles.curves import DoublingCurve, TorusCurve
 from contin.defining.special_points import FoldCurve
 
 
@@ -117,3 +118,12 @@ def test_linear_functions_do_not_bend():
     assert not ends.batch.bends(ends.columns)
     v, w = np.ones(system.size), np.ones(system.equations)
     assert not ends.bent(np.ones(system.size), w, v).any()
+
+
+def test_no_test_functions_of_points_that_take_more_states():
+    """One state has no second eigenvalue; two multipliers are those along the cycle and of what the curve consists of."""
+    orbit = turning()
+    cycles, _ = orbit.system.with_free(["mu", "period", "nu"], orbit.x)
+    for made in (cusp().points[0].system, FoldCurve(cycles), DoublingCurve(cycles), TorusCurve(cycles)):
+        own = {event.label for event in made.events()} - ({"R1"} if isinstance(made, TorusCurve) else set())
+        assert not own & {"BT", "ZH", "R1", "LPPD", "LPTR"}
