@@ -60,7 +60,7 @@ class BorderedMatrix:
     def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:
         rows = np.zeros((2, system.size + 1))
         rows[:, :-1] = phi * system.weights
-        self._system, self.borders = system, (phi, psi)
+        self._system, self._x, self.borders = system, x, (phi, psi)
         self.residual, self.factors = system.linearize(x, rows, psi[None, :])
         self._bordered = Bordered(self.factors, (system.equations, system.size), rows=2)
         self.kernel, self.g = self._bordered.right, self._bordered.g[:, 0]
@@ -82,18 +82,22 @@ class BorderedMatrix:
         """Whether the kernel and its multipliers have not turned away from the borders."""
         return rows_fit(self.kernel, self._system.weights) and not cosine(self.borders[1], self.multipliers()) < FITS
 
+    def gradient(self) -> Array:
+        """Return g as -w.F_x v, shape (2,), which round-off of the factors enters as a square."""
+        return -self.kernel @ self._system.transposed_product(self._x, self.multipliers())
+
     def left(self) -> Array:
         """Return the multipliers with unit length."""
         left = self.multipliers()
         return left / np.linalg.norm(left)
 
-    def hessian(self, x: Array) -> Array:
-        """Return the Hessian of beta, -w.F_xx v_i v_j, shape (2, 2), at the x that the matrix was made at.
+    def hessian(self) -> Array:
+        """Return the Hessian of beta, -w.F_xx v_i v_j, shape (2, 2).
 
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
         w = self.multipliers()
-        return -np.array([self._system.bent(x, w, v) for v in self.kernel]) @ self.kernel.T
+        return -np.array([self._system.bent(self._x, w, v) for v in self.kernel]) @ self.kernel.T
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
@@ -203,6 +207,7 @@ class BranchPoint(Finding):
                 search = _Search(system, before, newton, (self.kernel, self.left), self.hessian)
                 if not search.advance():
                     break
+                search.refine()
                 x, noise = search.x, np.maximum(noise, np.abs(search.x - before))
         return noise[system.state_size :]
 
@@ -282,6 +287,7 @@ def locate_branch_point(
             if not search.advance():
                 break
             if search.converged:
+                search.refine()
                 return search.result()
             search.prepare()
     raise ConvergenceError(f"no branch point near by (last update {search.before:.1e})")
@@ -306,7 +312,7 @@ class _Search:
         """Make one Newton step; return False where it leads nowhere."""
         matrix = self._matrix = BorderedMatrix(self.system, self.x, *self._borders)
         if self._hessian is None:
-            self._hessian, self._origin = matrix.hessian(self.x), self.x
+            self._hessian, self._origin = matrix.hessian(), self.x
             self._slope = self._hessian
         elif np.any(self._drop):  # Broyden's update
             missed = self._gradient - matrix.g - self._slope @ self._drop
@@ -324,6 +330,11 @@ class _Search:
         self.size = float(np.max(np.abs(update) / (1 + np.abs(self.x))))  # the x before: a huge update makes a huge x
         self.x = self.x - update
         return bool(np.isfinite(self.size) and self.size <= _GONE)
+
+    def refine(self) -> None:
+        """Take out of the last step what round-off of the factors has put into it."""
+        missed = self._matrix.gradient() - self._matrix.g
+        self.x = self.x - np.linalg.lstsq(self._slope, missed, rcond=DEPENDENT)[0] @ self._matrix.kernel
 
     @property
     def converged(self) -> bool:
@@ -349,7 +360,7 @@ class _Search:
         system, matrix, hessian = self.system, self._matrix, self._hessian
         if np.max(np.abs(self.x - self._origin)) > APART:
             matrix = BorderedMatrix(system, self.x, *self._borders)
-            hessian = matrix.hessian(self.x)
+            hessian = matrix.hessian()
         if not (np.isfinite(matrix.kernel).all() and np.isfinite(hessian).all() and matrix.is_regular()):
             raise ConvergenceError("no simple branch point near by: the kernel has more than two dimensions")
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]

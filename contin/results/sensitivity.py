@@ -118,5 +118,5 @@ def _of_branch_point(point: Record, name: str) -> dict[str, float]:
     response = matrix.factors.solve(np.concatenate([-column, [0.0, 0.0]]))[:-1]
     w, across = matrix.multipliers(), np.append(response, 1.0)
     slopes = -matrix.kernel @ wide.bent(x, w, across)[:-1]
-    moved = (response - np.linalg.solve(matrix.hessian(point.x), slopes) @ matrix.kernel) / size
+    moved = (response - np.linalg.solve(matrix.hessian(), slopes) @ matrix.kernel) / size
     return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bank.closed_forms import bratu, buckling_loads, elastica, parabola, pitchfork, two_elasticas
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Newton, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, MeshControl, Newton, solve, trace
 from contin.lowlevel import Algebraic, Collocation, MultiplePoint, locate_branch_point
 
 
@@ -22,6 +22,19 @@ def test_branch_points_of_the_elastica():
         away = max(found.tangents, key=lambda tangent: abs(tangent[0]))
         angle = system.states(away)[:, 0]
         assert angle == pytest.approx(angle[0] * np.cos(j * math.pi * system.nodes), abs=1e-5)
+
+
+@pytest.mark.parametrize(("degree", "intervals"), [(4, 20), (4, 80), (7, 32), (7, 64)])
+def test_round_off_of_factors_is_no_error(degree, intervals):
+    """Buckling of a clamped column at lam = (pi / 2)^2. Factors are off by 1e-16 for each of the mesh's intervals and more."""
+    column = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * np.sin(u.u)), lambda a, b, p: (a.u, b.v), ["u", "v"], {"lam": 1.0}
+    )
+    control = MeshControl(every=0)
+    start = solve(column, [0.0, 0.0], degree=degree, intervals=intervals, mesh=control)
+    (point,) = trace(start, free=["lam"], limits={"lam": (1, 4)}, mesh=control).labelled("BP")
+    off = abs(point["lam"] - math.pi**2 / 4)
+    assert off <= point.errors["lam"] < 5e-14 and off < 5e-15
 
 
 def test_transcritical_point_has_the_two_tangents_of_the_algebraic_equation():
