@@ -128,21 +128,21 @@ class Collocation(Composed):
             vars(self).pop(name, None)
         problem, degree, h = self.problem, self.degree, mesh[1:] - mesh[:-1]
         a, b = problem.domain
-        if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
+        if mesh.ndim != 1 or mesh.size < 2 or not h.min() > 0 or mesh[0] != a or mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
         self._take_pieces(mesh)
         self.mesh, self._h, self.intervals, self._grid = mesh, h, h.size, (mesh, degree)
         self.gauss_times: Array = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
         self.gauss_weights: Array = (h[:, None] * self.basis.weights).ravel()
-        self._h_points = np.repeat(h, degree)[:, None]
+        self._h_points = h.repeat(degree)[:, None]
         self.state_size = (self.intervals * degree + 1) * self._n
         self.size = self.state_size + len(self.free)
-        self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
-        self.equations = self._conditions
+        self.equations = self._conditions = h.size * degree * self._n + problem.boundary_size + problem.integral_size
         node_weights = np.empty(h.size * degree + 1)
         to_nodes(self.basis.value, self.gauss_weights[:, None] / (b - a), node_weights)
         #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
-        self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
+        self.weights = np.ones(self.size)
+        self.weights[: self.state_size].reshape(-1, self._n)[:] = node_weights[:, None]
 
     @property
     def states_count(self) -> int:
@@ -159,7 +159,7 @@ class Collocation(Composed):
     @property
     def nodes(self) -> Array:
         """Values of t at all nodes, shape (N d + 1,)."""
-        return np.append((self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel(), self.mesh[-1])
+        return np.concatenate([(self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel(), self.mesh[-1:]])
 
     def states(self, x: Array) -> Array:
         return self._scaled_states(x) * self.scales.states

@@ -110,7 +110,7 @@ class Defect:
         return f"Defect({self.system!r})"
 
     def __init__(self, system: Any) -> None:
-        self.system, self.tables, self.h = system, finer(system.degree), np.diff(system.mesh)
+        self.system, self.tables, self.h = system, finer(system.degree), system._h
         self.times = (system.mesh[:-1, None] + self.h[:, None] * self.tables.points).ravel()
         self.weights = (self.h[:, None] * self.tables.weights).ravel()
         self.n = system.states_count

@@ -232,11 +232,13 @@ def fill_density(d: int, mesh: Vector, jumps: Vector, round_off: float, least: f
 
 def halved(mesh: Array) -> Array:
     """Return places in order, and the middles between them."""
-    return np.sort(np.append(mesh, (mesh[1:] + mesh[:-1]) / 2))
+    return np.sort(np.concatenate([mesh, (mesh[1:] + mesh[:-1]) / 2]))
 
 
 def near(places: Array, breaks: Array, length: float) -> Array:
     """Return which places lie on a break."""
+    if not len(breaks):
+        return np.zeros(len(places), dtype=bool)
     return np.asarray((np.abs(places[:, None] - breaks) <= CORRECTED * length).any(axis=1))
 
 
@@ -273,15 +275,13 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl,
     It equidistributes the density (smoothed, and raised to at least a tenth of its mean so that no interval grows without
     bound) over as many intervals as ``control.tolerance`` takes.
     """
-    h = np.diff(mesh)
+    h = mesh[1:] - mesh[:-1]
     phi = _density(basis, mesh, states, breaks, _LEAST_DENSITY)
-    total = float(phi @ h)
-    allowed = share(basis, control.tolerance)
+    total, allowed = float(phi @ h), share(basis, control.tolerance)
     fewest = max(control.min_intervals, _A_PIECE * (len(breaks) + 1) if len(breaks) else 0)
     wanted = int(min(max(np.ceil(total / allowed), fewest), control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
-    there = breaks[near(breaks, mesh, mesh[-1] - mesh[0])] if len(breaks) else breaks
-    enough = enough and len(there) == len(breaks)
+    enough = enough and (not len(breaks) or bool(near(breaks, mesh, mesh[-1] - mesh[0]).all()))
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
     return _equidistributed(mesh, phi, max(h.size if enough else wanted, len(breaks) + 1), breaks)
@@ -300,9 +300,9 @@ def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) ->
 
 def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _NOWHERE) -> Array:
     """Return a mesh whose intervals have equal shares of the density; between breaks, which are mesh points, about equal."""
-    h = np.diff(mesh)
-    share = np.concatenate([[0.0], np.cumsum(phi * h)]) / (phi @ h)
-    places = np.linspace(0, 1, intervals + 1)
+    h, share = mesh[1:] - mesh[:-1], np.zeros(mesh.size)
+    share[1:] = np.cumsum(phi * h) / (phi @ h)
+    places = np.arange(intervals + 1) * (1 / intervals)
     if len(breaks):
         ends = np.concatenate([[0.0], np.interp(breaks, mesh, share), [1.0]])
         counts = _shared_out(np.diff(ends), max(intervals, len(breaks) + 1))
