@@ -587,7 +587,7 @@ class Collocation(Composed):
         """Return F_x^T w, shape (size,), for w (equations,)."""
         inside, ends = self._terms
         result = inside.transposed(x, w) + ends.transposed(x, w)
-        rates = np.pad(w[: self._inner].reshape(-1, self._n), ((0, 0), (0, len(self.free))))
+        rates = np.hstack([w[: self._inner].reshape(-1, self._n), np.zeros((self.gauss_times.size, len(self.free)))])
         result = result + self._to_nodes(rates, self.basis.slope)
         return result + w[self._conditions :] @ self.conditions_with_rows(x)[1] if self._further else result
 
