@@ -60,7 +60,7 @@ class BorderedMatrix:
     def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:
         rows = np.zeros((2, system.size + 1))
         rows[:, :-1] = phi * system.weights
-        self._system, self._x, self.borders = system, x, (phi, psi)
+        self._system, self.x, self.borders = system, x, (phi, psi)
         self.residual, self.factors = system.linearize(x, rows, psi[None, :])
         self._bordered = Bordered(self.factors, (system.equations, system.size), rows=2)
         self.kernel, self.g = self._bordered.right, self._bordered.g[:, 0]
@@ -82,9 +82,9 @@ class BorderedMatrix:
         """Whether the kernel and its multipliers have not turned away from the borders."""
         return rows_fit(self.kernel, self._system.weights) and not cosine(self.borders[1], self.multipliers()) < FITS
 
-    def gradient(self) -> Array:
-        """Return g as -w.F_x v, shape (2,), which round-off of the factors enters as a square."""
-        return -self.kernel @ self._system.transposed_product(self._x, self.multipliers())
+    def gradient(self, x: Array) -> Array:
+        """Return g at x, or right beside it, as -w.F_x v, shape (2,), which round-off of the factors enters as a square."""
+        return -self.kernel @ self._system.transposed_product(x, self.multipliers())
 
     def left(self) -> Array:
         """Return the multipliers with unit length."""
@@ -97,7 +97,7 @@ class BorderedMatrix:
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
         w = self.multipliers()
-        return -np.array([self._system.bent(self._x, w, v) for v in self.kernel]) @ self.kernel.T
+        return -np.array([self._system.bent(self.x, w, v) for v in self.kernel]) @ self.kernel.T
 
 
 def borders_at(system: Discretization, x: Array, kernel: Array | None = None) -> tuple[Array, Array]:
@@ -188,8 +188,7 @@ class BranchPoint(Finding):
     def round_off(self, system: Discretization, newton: Newton) -> Array:
         """Return by how much free parameters change by round-off, shape (free parameters,).
 
-        That is seen by further Newton steps, which lead nowhere. Each begins where the one before ended, rounded once more:
-        round-off of all residuals is drawn anew.
+        Newton steps from the point, rounded anew each time, lead back to it but for that.
 
         Examples
         --------
@@ -200,15 +199,14 @@ class BranchPoint(Finding):
         >>> bool(locate_branch_point(system, np.array([0.1, 1.1])).round_off(system, Newton()).max() < 1e-15)
         True
         """
-        random, x, noise = generator("branch point"), self.x, np.zeros_like(self.x)
+        random, noise = generator("branch point"), np.zeros_like(self.x)
         with np.errstate(all="ignore"):
+            matrix = BorderedMatrix(system, self.x, self.kernel, self.left)
             for _ in range(draws.DRAWS):
-                before = draws.rounded(random, x)
-                search = _Search(system, before, newton, (self.kernel, self.left), self.hessian)
-                if not search.advance():
-                    break
-                search.refine()
-                x, noise = search.x, np.maximum(noise, np.abs(search.x - before))
+                x = draws.rounded(random, self.x)
+                update = matrix.factors.solve(np.concatenate([system.residual(x), [0.0, 0.0]]))[:-1]
+                update = update + _drop(self.hessian, matrix.gradient(x)) @ matrix.kernel
+                noise = np.maximum(noise, np.abs(x - update - self.x))
         return noise[system.state_size :]
 
     @property
@@ -296,15 +294,14 @@ def locate_branch_point(
 class _Search:
     """The iteration of `locate_branch_point`: x, beta, and the Hessian, if known, with what is known of its change."""
 
-    def __init__(
-        self, system: Discretization, x: Array, newton: Newton, borders: tuple[Array, Array], hessian: Array | None = None
-    ) -> None:
+    def __init__(self, system: Discretization, x: Array, newton: Newton, borders: tuple[Array, Array]) -> None:
         self.system, self.x, self.newton = system, x, newton
         self.beta = 0.0
         self.size, self.before = np.inf, np.inf  # of the last update, and of the one before
         self._rate_before = 1.0
-        self._borders, self._hessian = borders, hessian
-        self._slope: Any = hessian  # the Hessian, corrected by how the gradient has really changed
+        self._borders = borders
+        self._hessian: Array | None = None
+        self._slope: Any = None  # the Hessian, corrected by how the gradient has really changed
         self._drop: Array = np.zeros(2)  # the last update along the kernel
         self._gradient: Array = np.zeros(2)  # g before it
 
@@ -320,8 +317,7 @@ class _Search:
         if not (np.isfinite(self._hessian).all() and np.isfinite(matrix.g).all()):
             return False
         correction = matrix.factors.solve(np.concatenate([matrix.residual + self.beta * self._borders[1], [0.0, 0.0]]))
-        drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=DEPENDENT)[0]
-        self._drop = drop
+        self._drop = _drop(self._slope, matrix.g)
         self._gradient = matrix.g
         if np.abs(self._slope @ self._drop - matrix.g).max() > _UNEXPLAINED * np.abs(matrix.g).max():
             return False  # a gradient that does not change along the kernel: no branch point here
@@ -333,8 +329,7 @@ class _Search:
 
     def refine(self) -> None:
         """Take out of the last step what round-off of the factors has put into it."""
-        missed = self._matrix.gradient() - self._matrix.g
-        self.x = self.x - np.linalg.lstsq(self._slope, missed, rcond=DEPENDENT)[0] @ self._matrix.kernel
+        self.x = self.x - _drop(self._slope, self._matrix.gradient(self._matrix.x) - self._matrix.g) @ self._matrix.kernel
 
     @property
     def converged(self) -> bool:
@@ -370,6 +365,11 @@ class _Search:
         change = np.linalg.inv([[inner(system, old, new) for new in kernel] for old in matrix.kernel])  # new = change @ old
         hessian = change @ hessian @ change.T
         return BranchPoint(self.x, tuple(tangents), kernel, matrix.left(), hessian, float(abs(self.beta)))
+
+
+def _drop(slope: Array, gradient: Array) -> Array:
+    """Return by how much to go back along the kernel for a gradient to vanish."""
+    return np.asarray(np.linalg.lstsq(slope, gradient, rcond=DEPENDENT)[0])
 
 
 def _null_directions(hessian: Array) -> list[Array]:
