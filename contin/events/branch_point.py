@@ -185,7 +185,7 @@ class BranchPoint(Finding):
             raise Elsewhere("another branch point was found on the finer mesh")
         return found.along(system, carry(self.tangents[0])) if self.tangents else found
 
-    def round_off(self, system: Discretization, newton: Newton) -> Array:
+    def round_off(self, system: Discretization) -> Array:
         """Return by how much free parameters change by round-off, shape (free parameters,).
 
         Newton steps from the point, rounded anew each time, lead back to it but for that.
@@ -196,7 +196,7 @@ class BranchPoint(Finding):
         >>> from contin.lowlevel import Algebraic
         >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2 - 1),), ["x"], {"a": 1.0})
         >>> system = Algebraic(pitchfork, ["a"])
-        >>> bool(locate_branch_point(system, np.array([0.1, 1.1])).round_off(system, Newton()).max() < 1e-15)
+        >>> bool(locate_branch_point(system, np.array([0.1, 1.1])).round_off(system).max() < 1e-15)
         True
         """
         random, noise = generator("branch point"), np.zeros_like(self.x)

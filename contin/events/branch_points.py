@@ -77,7 +77,7 @@ class BranchPointSearch:
         self._shares = np.sort(shares(values[values.real < 0]))
         return count, clear and (not self._says_sign or (count % 2 == 1) == self._sign_changes)
 
-    @property
+    @functools.cached_property
     def _cannot_branch(self) -> bool:
         """Both ends of the step say that no other branch crosses this one."""
         return same_sign(self.arc.before.sign, self.arc.trial.sign) and self.arc.state.system.cannot_branch(self.arc)

@@ -50,7 +50,7 @@ class Finding:
         """Return the point that was found, with a tangent."""
         return Trial(system, self.x, Linearization(tangent, np.nan))
 
-    def round_off(self, system: Discretization, newton: Newton) -> Array | float:
+    def round_off(self, system: Discretization) -> Array | float:
         """Return by how much free parameters are off where Newton's method ends by round-off, shape (further unknowns,)."""
         return 0.0
 

@@ -141,7 +141,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             break
         before, last = steps, moved
     if known is not None:
-        known = (known + finding_of(details).round_off(trial.system, settings.newton))[: len(errors)]
+        known = (known + finding_of(details).round_off(trial.system))[: len(errors)]
         errors = dict(zip(errors, map(float, known * trial.system.free_scales)))
     return Refined(trial, _with_cut_off(errors, trial, point.test, now.slope, settings.primary), details, is_lost)
 

@@ -80,9 +80,9 @@ def test_a_state_beyond_a_fold_is_found_by_descent(monkeypatch):
     """The way from the drawing turns back at 68 %; a hinge whose axis is not of unit length."""
     network, said = _random(82), []
 
-    def first_point(*given, _usual=network.first_point):
+    def first_point(*given, _usual=network.first_point, **options):
         try:
-            return _usual(*given)
+            return _usual(*given, **options)
         except OutOfReach as error:
             said.append(str(error))
             raise
